@@ -1,0 +1,20 @@
+"""Where files live, and the frozen numbers that more than one layer needs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+FRAME_WIDTH = 640
+FRAME_HEIGHT = 480
+VERTICAL_FOV_DEG = 60.0
+
+
+def cache_dir() -> Path:
+    """The folder for what can be made again (FORESTALL_CACHE overrides it)."""
+    override = os.environ.get("FORESTALL_CACHE")
+    if override:
+        return Path(override)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("forestall", appauthor=False)

@@ -1,0 +1,66 @@
+"""The one error family.
+
+ForestallError
+├── InputError             what the user gave is not valid; one line that says what would be
+│   ├── UnknownNameError   a name that is not known, with the nearest known ones
+│   ├── FileFormatError    a file that cannot be read as what it should be
+│   └── MissingExtraError  an optional dependency is not installed
+├── MemoryFileError        the demonstration file is empty, of another version, damaged or locked
+├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
+└── PerceptionError        an observation that cannot be used (NaN depth, wrong shapes)
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ForestallError(Exception):
+    """Base of every error that forestall raises on purpose; its text is one clear line."""
+
+
+class InputError(ForestallError):
+    """What the user gave is not valid."""
+
+
+class UnknownNameError(InputError):
+    """A name outside a closed vocabulary.
+
+    Args:
+        kind: what the name should name, e.g. "task".
+        name: the name that was given.
+        known: every name that would be valid.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        options = sorted(known)
+        near = difflib.get_close_matches(name, options, n=3, cutoff=0.5)
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        super().__init__(f"unknown {kind} {name!r}: {hint}known: {', '.join(options) or 'none'}")
+        self.kind = kind
+        self.name = name
+        self.known = tuple(options)
+
+
+class FileFormatError(InputError):
+    """A file that cannot be read as what it should be."""
+
+
+class MissingExtraError(InputError):
+    """An optional dependency is not installed."""
+
+    def __init__(self, feature: str, extra: str) -> None:
+        super().__init__(f"{feature} needs an extra: pip install 'forestall[{extra}]'")
+
+
+class MemoryFileError(ForestallError):
+    """The demonstration file is empty, of another schema version, damaged or locked."""
+
+
+class SceneError(ForestallError):
+    """A scene cannot be built as asked."""
+
+
+class PerceptionError(ForestallError):
+    """An observation that cannot be used."""

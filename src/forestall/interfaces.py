@@ -1,0 +1,228 @@
+"""Every Protocol of the project; implementations never import each other.
+
+Calls point downwards: a command builds a runtime (`build.py`), the runtime calls its strategy, the
+strategy calls detector, reasoner, replanner; all of them see only this file and `types/`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.types.demonstration import Demonstration
+from forestall.types.episode import EpisodeRecord, Event, SkillOutcome
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Detection, Frame, Observation, Vec3
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
+
+
+class Environment(Protocol):
+    """A world in which a robot looks and acts. One instance is one scene."""
+
+    def reset(self, seed: int) -> None:
+        """Put the world into the start state of this seed, the same to the last bit each time."""
+
+    def scan(self) -> Observation:
+        """Look around from where the robot stands (several frames)."""
+
+    def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
+        """Look towards world points (one frame for each, straight ahead when empty)."""
+
+    def execute(self, subtask: Subtask) -> SkillOutcome:
+        """Run one skill; refuse with a reason when its needs are not met."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since reset."""
+
+    def close(self) -> None:
+        """Free what the environment holds."""
+
+
+class OracleView(Protocol):
+    """Ground truth. Only envs/, perception/oracle and benchmark/ may touch it."""
+
+    def truth(self) -> SceneGraph:
+        """The complete state: every object, every state, containment, what is held."""
+
+    def states(self, instance: str) -> Mapping[str, str]:
+        """True attribute values of one instance, empty if there is no such instance now."""
+
+    def spoiled(self) -> frozenset[str]:
+        """Instances to which something irreversible has happened."""
+
+    def events(self) -> tuple[Event, ...]:
+        """Everything that has happened since reset, in order."""
+
+
+class Disturbance(Protocol):
+    """What a fault may do to a world while it runs (benchmark only)."""
+
+    def drop_held(self) -> str | None:
+        """Let go of the held object where the robot is; its name, None for an empty hand."""
+
+
+class Renderer(Protocol):
+    """Draws one frame of a compiled MuJoCo model (embedded household only)."""
+
+    name: str
+
+    def render(self, data: Any, camera_to_world: npt.NDArray[np.float64]) -> Frame:
+        """RGB, metric z-depth and instance ids of the current state.
+
+        Args:
+            data: mujoco.MjData of the model that the renderer was made for.
+            camera_to_world: (4, 4), x right, y down, z forward.
+        """
+
+
+class Segmenter(Protocol):
+    """Finds instances in a frame."""
+
+    name: str
+
+    def segment(self, frame: Frame) -> Sequence[Detection]:
+        """Instance masks with categories; the same instance name over frames when it tracks."""
+
+
+class StateEstimator(Protocol):
+    """Reads states of detected objects off a frame."""
+
+    name: str
+
+    def estimate(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> Sequence[Mapping[str, str | None]]:
+        """For each detection: attribute → value, None where it cannot be told."""
+
+
+class Perceiver(Protocol):
+    """Turns observations into one scene graph that lives over the episode."""
+
+    def reset(self) -> None:
+        """Forget everything."""
+
+    def perceive(self, observation: Observation) -> SceneGraph:
+        """Fuse an observation and return the whole graph as believed now."""
+
+    def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
+        """The part of a graph that concerns a (grounded) subtask, with its subtask node."""
+
+    def describe(self) -> Mapping[str, str]:
+        """Which segmenter and state estimator are used (goes into every record)."""
+
+
+class TextEncoder(Protocol):
+    """Embeds short texts."""
+
+    name: str
+
+    def encode(self, texts: Sequence[str]) -> npt.NDArray[np.float32]:
+        """(n, d) float32 rows of unit length."""
+
+
+class DemonstrationStore(Protocol):
+    """Where demonstrations live."""
+
+    def add(self, demonstration: Demonstration) -> str:
+        """Store one successful run in one transaction; returns its id."""
+
+    def all(self) -> Sequence[Demonstration]:
+        """Every demonstration in id order (graphs loaded, images by reference)."""
+
+
+class Retriever(Protocol):
+    """Context-aware reference retrieval (paper, Sec. 3)."""
+
+    def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
+        """References for a subtask, best first; `done` is how many subtasks were executed."""
+
+
+class GraphScorer(Protocol):
+    """Compares an observed graph with an expected one."""
+
+    def best(self, observed: SceneGraph, references: Sequence[Reference]) -> Verdict | None:
+        """Score against every reference; None where there is none."""
+
+
+class Detector(Protocol):
+    """Judges whether a scene fits its references."""
+
+    name: str
+
+    def judge(
+        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+    ) -> Verdict:
+        """`observed` is the scoped graph of the boundary."""
+
+
+class Reasoner(Protocol):
+    """Explains a mismatch and says what must change (paper, "reasoning module")."""
+
+    name: str
+
+    def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
+        """An empty `must_change` says that nothing was found that must change."""
+
+
+class PlanValidator(Protocol):
+    """Executes any plan on an observed graph."""
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        """Names the first step that cannot run and why; then checks the goal."""
+
+
+class Replanner(Protocol):
+    """Makes the corrected plan for the rest of the task (paper, "replanning module")."""
+
+    name: str
+
+    def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
+        """A plan that starts from the observed state and replaces what was left of the old one."""
+
+
+class Strategy(Protocol):
+    """Where a run may be interrupted; one loop serves all strategies."""
+
+    name: str
+
+    def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
+        """Called with the perceived scene before each subtask."""
+
+    def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
+        """Called after each subtask."""
+
+    def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
+        """Called when the plan is finished; may ask for a further plan."""
+
+
+class Listener(Protocol):
+    """Records, pages, progress; cannot change an episode."""
+
+    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
+        """The episode begins."""
+
+    def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
+        """A boundary was judged."""
+
+    def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
+        """A subtask was executed."""
+
+    def on_end(self, record: EpisodeRecord) -> None:
+        """The episode is over."""
+
+
+class GoalChecker(Protocol):
+    """Scores a finished run on the truth (benchmark only)."""
+
+    def check(self, goal: Goal, oracle: OracleView) -> tuple[bool, bool | None, tuple[str, ...]]:
+        """Strict success, the weaker check of REFLECT, and what failed in words."""
+
+
+__all__ = [name for name, value in list(globals().items()) if getattr(value, "_is_protocol", False)]

@@ -1,0 +1,97 @@
+"""What happened in one run, complete enough to rebuild and to redraw it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+from forestall.types.plan import Plan, Subtask
+from forestall.types.task import Task
+from forestall.types.verdict import Diagnosis, Replan, Verdict
+
+
+class SkillStatus(Enum):
+    """How a skill ended."""
+
+    SUCCEEDED = "succeeded"
+    REFUSED = "refused"  # a need was not met; nothing changed but the robot's own position
+    FAILED = "failed"  # it started and went wrong
+
+
+@dataclass(frozen=True, slots=True)
+class SkillOutcome:
+    """The environment's answer to one subtask, as the robot's own controller would know it."""
+
+    status: SkillStatus
+    duration_s: float
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One thing that happened in the world (oracle side): time, kind, objects, words."""
+
+    time_s: float
+    kind: str
+    objects: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoundaryRecord:
+    """One subtask boundary: what was seen, judged and decided before the subtask."""
+
+    index: int  # position in the executed sequence
+    subtask: Subtask  # as grounded
+    graph: SceneGraph  # whole fused graph
+    scoped: SceneGraph  # what concerns the subtask
+    observation: Observation | None
+    looks: int
+    verdict: Verdict | None
+    diagnosis: Diagnosis | None = None
+    replan: Replan | None = None
+    seconds: tuple[tuple[str, float], ...] = ()  # compute by phase
+    time_s: float = 0.0  # simulated
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutedRecord:
+    """One executed subtask."""
+
+    subtask: Subtask
+    outcome: SkillOutcome
+    index: int
+
+
+class EpisodeEnd(Enum):
+    """Why an episode ended."""
+
+    PLAN_FINISHED = "plan finished"
+    SUBTASK_LIMIT = "subtask limit"
+    REPLAN_LIMIT = "replan limit"
+    STOPPED = "stopped safely"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeRecord:
+    """The record of one run."""
+
+    task: Task
+    scenario: str | None
+    strategy: str
+    seed: int
+    initial_plan: Plan
+    boundaries: tuple[BoundaryRecord, ...]
+    executed: tuple[ExecutedRecord, ...]
+    end: EpisodeEnd
+    success: bool | None = None  # strict check, filled by the scorer
+    weak_success: bool | None = None  # REFLECT's own check
+    failures: tuple[str, ...] = ()  # which goal facts failed, in words
+    events: tuple[Event, ...] = ()  # oracle history, filled by the scorer
+    simulated_s: float = 0.0
+    compute_s: tuple[tuple[str, float], ...] = ()
+    provenance: tuple[tuple[str, Any], ...] = field(default=(), hash=False)

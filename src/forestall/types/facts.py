@@ -1,0 +1,105 @@
+"""Literals: facts about named things, and their three truth values.
+
+A literal is a variable (a predicate over names) with a value. State literals use the attribute as
+predicate and one of its values: `dirty(Plate-1)=clean`. Relations and derived predicates have the
+values `true` and `false`: `inside(Bowl-1, Microwave-1)`, `not inside(Bowl-1, Microwave-1)`.
+Arguments are instance names ("Plate-1"), category names ("Plate") or variables ("?object").
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from forestall.errors import InputError
+
+GRIPPER = "gripper"
+
+RELATIONS = (
+    "above",
+    "behind",
+    "below",
+    "blocking",
+    "held_by",
+    "in_front_of",
+    "inside",
+    "left_of",
+    "near",
+    "on_top_of",
+    "right_of",
+)
+"""Every predicate that a scene-graph edge may carry (paper, Sec. 3 and Fig. 3)."""
+
+DERIVED = ("hand_empty", "located", "unblocked", "vacant", "accessible", "spoiled")
+"""Predicates computed from states and relations; `spoiled` is history and never seen.
+
+- hand_empty(): the gripper holds nothing.
+- located(x): the position of x is known.
+- unblocked(x): no y with blocking(y, x).
+- vacant(x): nothing is inside or on top of x.
+- accessible(x): x is not inside something closed.
+- spoiled(x): x has taken part in something that cannot be undone.
+"""
+
+
+class Truth(Enum):
+    """A fact is true, false, or could not be observed."""
+
+    TRUE = "true"
+    FALSE = "false"
+    UNOBSERVED = "unobserved"
+
+
+_TEXT = re.compile(r"^\s*(not\s+)?([a-z_]+)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]+))?\s*$")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Literal:
+    """One fact: `predicate(args)=value`."""
+
+    predicate: str
+    args: tuple[str, ...]
+    value: str = "true"
+
+    def __str__(self) -> str:
+        body = f"{self.predicate}({', '.join(self.args)})"
+        if self.value == "true":
+            return body
+        if self.value == "false":
+            return f"not {body}"
+        return f"{body}={self.value}"
+
+    @classmethod
+    def parse(cls, text: str) -> Literal:
+        """Read the text form.
+
+        Raises:
+            InputError: the text is not `predicate(a, b)`, `not predicate(a)` or `attribute(a)=v`.
+        """
+        match = _TEXT.match(text)
+        if match is None or (match[1] and match[4]):
+            raise InputError(
+                f"cannot read {text!r} as a fact: write attribute(Thing)=value, "
+                "predicate(A, B) or not predicate(A, B)"
+            )
+        args = tuple(a.strip() for a in match[3].split(",")) if match[3].strip() else ()
+        if any(not a for a in args):
+            raise InputError(f"cannot read {text!r} as a fact: an argument is empty")
+        return cls(match[2], args, "false" if match[1] else (match[4] or "true"))
+
+    def bind(self, names: Mapping[str, str]) -> Literal:
+        """Replace arguments that are keys of `names`."""
+        return Literal(self.predicate, tuple(names.get(a, a) for a in self.args), self.value)
+
+
+def category_of(name: str) -> str:
+    """The category part of an instance name: "StoveBurner-4" → "StoveBurner"."""
+    head, _, tail = name.rpartition("-")
+    return head if head and tail.isdigit() else name
+
+
+def is_instance(name: str) -> bool:
+    """Whether a name carries an instance number."""
+    return category_of(name) != name

@@ -1,0 +1,360 @@
+"""The 3D scene graph (paper, Sec. 3 "3D Scene Graph Construction").
+
+World frame: right-handed, metres, z up. A graph is frozen; nodes and relations are sorted, so two
+equal graphs have equal text, JSON and hashes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from forestall.errors import FileFormatError, InputError
+from forestall.types.facts import GRIPPER, RELATIONS, Literal, Truth, category_of
+from forestall.types.observation import Vec3
+from forestall.types.plan import Subtask
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+GRAPH_FORMAT = 1
+
+
+class Seen(Enum):
+    """How a node came into the graph."""
+
+    VISIBLE = "visible"  # in a view of this boundary
+    REMEMBERED = "remembered"  # seen before; nothing since says that it has gone
+    UNOBSERVED = "unobserved"  # known to be somewhere that no view can reach now
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Axis-aligned box in the world, metres."""
+
+    low: Vec3
+    high: Vec3
+
+    def __post_init__(self) -> None:
+        if any(a > b for a, b in zip(self.low, self.high, strict=True)):
+            raise InputError(f"box corners are out of order: {self.low} > {self.high}")
+
+    @property
+    def size(self) -> Vec3:
+        """Edge lengths."""
+        (a, b, c), (d, e, f) = self.low, self.high
+        return (d - a, e - b, f - c)
+
+    @property
+    def centre(self) -> Vec3:
+        """Midpoint."""
+        (a, b, c), (d, e, f) = self.low, self.high
+        return ((a + d) / 2, (b + e) / 2, (c + f) / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectNode:
+    """One object: stable id, category, states (value None: unobserved), where and how seen.
+
+    `centroid_m` and `box_m` are None when the object was never located. `pixels` counts the mask
+    pixels of the newest view that saw it.
+    """
+
+    id: str
+    category: str
+    states: tuple[tuple[str, str | None], ...] = ()
+    centroid_m: Vec3 | None = None
+    box_m: Box | None = None
+    seen: Seen = Seen.VISIBLE
+    pixels: int = 0
+    last_seen_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "states", tuple(sorted(self.states)))
+
+    def __hash__(self) -> int:
+        return hash(self.id)
+
+    def state(self, attribute: str) -> str | None:
+        """The value of an attribute, None when unobserved or not an attribute of this object."""
+        return dict(self.states).get(attribute)
+
+    def label(self) -> str:
+        """Category with its known states: "Plate (clean, intact)"."""
+        known = [v for _, v in self.states if v is not None]
+        return f"{self.category} ({', '.join(known)})" if known else self.category
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Relation:
+    """A directed labelled edge."""
+
+    subject: str
+    predicate: str
+    object: str
+
+    def __str__(self) -> str:
+        return f"{self.subject} {self.predicate.replace('_', ' ')} {self.object}"
+
+
+@dataclass(frozen=True, slots=True)
+class SceneGraph:
+    """Objects, the gripper, relations, and one subtask node tied to nothing.
+
+    Args:
+        nodes: object nodes; the gripper is the node "gripper" when present.
+        relations: edges between nodes; "held_by" points at "gripper".
+        subtask: the subtask that this graph was made for.
+        hidden: ids of containers whose inside no view could reach; what is in them is unobserved.
+
+    Raises:
+        InputError: an id twice, an edge to a node that is not there, an unknown predicate.
+    """
+
+    nodes: tuple[ObjectNode, ...]
+    relations: tuple[Relation, ...] = ()
+    subtask: Subtask | None = None
+    hidden: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nodes", tuple(sorted(self.nodes, key=lambda n: n.id)))
+        object.__setattr__(self, "relations", tuple(sorted(set(self.relations))))
+        object.__setattr__(self, "hidden", tuple(sorted(set(self.hidden))))
+        ids = {n.id for n in self.nodes}
+        if len(ids) != len(self.nodes):
+            twice = sorted({n.id for n in self.nodes if [m.id for m in self.nodes].count(n.id) > 1})
+            raise InputError(f"node ids must be unique; twice: {', '.join(twice)}")
+        for r in self.relations:
+            if r.predicate not in RELATIONS:
+                raise InputError(
+                    f"unknown relation {r.predicate!r} in '{r}': known: {', '.join(RELATIONS)}"
+                )
+            for end in (r.subject, r.object):
+                if end not in ids:
+                    raise InputError(f"relation '{r}' names {end!r}, which is not a node")
+        for h in self.hidden:
+            if h not in ids:
+                raise InputError(f"hidden names {h!r}, which is not a node")
+
+    def get(self, node_id: str) -> ObjectNode | None:
+        """The node with this id, or None."""
+        return next((n for n in self.nodes if n.id == node_id), None)
+
+    def of_category(self, category: str) -> tuple[ObjectNode, ...]:
+        """Every node of a category, in id order."""
+        return tuple(n for n in self.nodes if n.category == category)
+
+    @property
+    def holding(self) -> str | None:
+        """What the gripper holds."""
+        return next((r.subject for r in self.relations if r.predicate == "held_by"), None)
+
+    def contents(self, node_id: str) -> tuple[str, ...]:
+        """Ids of what is directly inside or on top of a node."""
+        return tuple(
+            r.subject
+            for r in self.relations
+            if r.object == node_id and r.predicate in ("inside", "on_top_of")
+        )
+
+    def parents(self, node_id: str) -> tuple[str, ...]:
+        """Ids of what a node is directly inside or on top of."""
+        return tuple(
+            r.object
+            for r in self.relations
+            if r.subject == node_id and r.predicate in ("inside", "on_top_of")
+        )
+
+    def matches(self, name: str) -> tuple[str, ...]:
+        """Ids that a name can mean: the instance itself, or every node of that category."""
+        if self.get(name) is not None:
+            return (name,)
+        return tuple(n.id for n in self.nodes if n.category == name)
+
+    def truth(self, literal: Literal) -> Truth:
+        """The three-valued truth of a ground literal (instance names as arguments).
+
+        A category name as argument means "some instance of it": true if any instance makes it
+        true, false if all make it false.
+        """
+        return _any_truth(
+            [_ground_truth(self, g) for g in _groundings(self, literal)], literal.value == "false"
+        )
+
+    def text(self) -> str:
+        """Readable text, one fact a line, sorted."""
+        lines = [] if self.subtask is None else [f"subtask: {self.subtask}"]
+        for n in self.nodes:
+            if n.id != GRIPPER:
+                how = "" if n.seen is Seen.VISIBLE else f" [{n.seen.value}]"
+                lines.append(f"{n.id}: {n.label()}{how}")
+        lines += [str(r) for r in self.relations]
+        lines += [f"inside of {h}: unobserved" for h in self.hidden]
+        return "\n".join(lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "format": GRAPH_FORMAT,
+            "subtask": None if self.subtask is None else str(self.subtask),
+            "nodes": [
+                {
+                    "id": n.id,
+                    "category": n.category,
+                    "states": dict(n.states),
+                    "centroid_m": n.centroid_m,
+                    "box_m": None if n.box_m is None else [n.box_m.low, n.box_m.high],
+                    "seen": n.seen.value,
+                    "pixels": n.pixels,
+                    "last_seen_s": n.last_seen_s,
+                }
+                for n in self.nodes
+            ],
+            "relations": [[r.subject, r.predicate, r.object] for r in self.relations],
+            "hidden": list(self.hidden),
+        }
+
+    @classmethod
+    def from_json(cls, data: Any) -> SceneGraph:
+        """Read what `to_json` wrote.
+
+        Raises:
+            FileFormatError: not a scene graph, another format version, or a broken field.
+            InputError: a dangling relation, an id twice, an unknown predicate.
+        """
+        if not isinstance(data, dict) or "nodes" not in data:
+            raise FileFormatError("not a scene graph: an object with 'nodes' is expected")
+        if data.get("format") != GRAPH_FORMAT:
+            raise FileFormatError(
+                f"scene graph format {data.get('format')!r}: this version reads {GRAPH_FORMAT}"
+            )
+        try:
+            nodes = tuple(_node(n) for n in data["nodes"])
+            relations = tuple(Relation(*map(str, r)) for r in data.get("relations", ()))
+            subtask = Subtask.parse(data["subtask"]) if data.get("subtask") else None
+            hidden = tuple(map(str, data.get("hidden", ())))
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(f"broken scene graph: {error!r}") from error
+        return cls(nodes, relations, subtask, hidden)
+
+    def to_networkx(self) -> nx.MultiDiGraph:
+        """The same graph for networkx; attributes as in the JSON form."""
+        import networkx as nx
+
+        graph = nx.MultiDiGraph(subtask=None if self.subtask is None else str(self.subtask))
+        for n in self.nodes:
+            graph.add_node(n.id, category=n.category, states=dict(n.states), seen=n.seen.value)
+        for r in self.relations:
+            graph.add_edge(r.subject, r.object, key=r.predicate, predicate=r.predicate)
+        return graph
+
+
+def _vec(values: Iterable[float] | None) -> Vec3 | None:
+    if values is None:
+        return None
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)
+
+
+def _node(data: dict[str, Any]) -> ObjectNode:
+    box = data.get("box_m")
+    low, high = (_vec(box[0]), _vec(box[1])) if box is not None else (None, None)
+    return ObjectNode(
+        id=str(data["id"]),
+        category=str(data["category"]),
+        states=tuple(
+            (str(k), None if v is None else str(v)) for k, v in data.get("states", {}).items()
+        ),
+        centroid_m=_vec(data.get("centroid_m")),
+        box_m=None if low is None or high is None else Box(low, high),
+        seen=Seen(data.get("seen", "visible")),
+        pixels=int(data.get("pixels", 0)),
+        last_seen_s=float(data.get("last_seen_s", 0.0)),
+    )
+
+
+def _groundings(graph: SceneGraph, literal: Literal) -> list[Literal]:
+    ground = [literal]
+    for position, name in enumerate(literal.args):
+        if graph.get(name) is None and category_of(name) == name:
+            ids = graph.matches(name)
+            ground = [
+                Literal(g.predicate, (*g.args[:position], i, *g.args[position + 1 :]), g.value)
+                for g in ground
+                for i in ids
+            ]
+    return ground
+
+
+def _any_truth(values: list[Truth], negative: bool) -> Truth:
+    """Three-valued "or"; for a negative literal "and" (no instance may make it true)."""
+    if negative:
+        if Truth.FALSE in values:
+            return Truth.FALSE
+        return Truth.UNOBSERVED if Truth.UNOBSERVED in values else Truth.TRUE
+    if Truth.TRUE in values:
+        return Truth.TRUE
+    return Truth.UNOBSERVED if Truth.UNOBSERVED in values or not values else Truth.FALSE
+
+
+def _of(value: bool, wanted: str) -> Truth:
+    return Truth.TRUE if value == (wanted == "true") else Truth.FALSE
+
+
+def _ground_truth(graph: SceneGraph, literal: Literal) -> Truth:
+    p, args, wanted = literal.predicate, literal.args, literal.value
+    if p == "hand_empty":
+        return _of(graph.holding is None, wanted)
+    node = graph.get(args[0]) if args else None
+    if p in RELATIONS:
+        return _relation_truth(graph, literal)
+    if p == "located":
+        return _of(node is not None and node.box_m is not None, wanted)
+    if node is None:
+        return Truth.UNOBSERVED
+    if p == "vacant":
+        if graph.contents(node.id):
+            return _of(False, wanted)
+        return Truth.UNOBSERVED if node.id in graph.hidden else _of(True, wanted)
+    if p == "unblocked":
+        blocked = any(r.predicate == "blocking" and r.object == node.id for r in graph.relations)
+        return _of(not blocked, wanted)
+    if p == "accessible":
+        return _accessible(graph, node.id, wanted)
+    if p == "spoiled":
+        return Truth.UNOBSERVED
+    value = node.state(p)
+    if value is None:
+        return Truth.UNOBSERVED
+    return Truth.TRUE if value == wanted else Truth.FALSE
+
+
+def _accessible(graph: SceneGraph, node_id: str, wanted: str) -> Truth:
+    for parent_id in graph.parents(node_id):
+        parent = graph.get(parent_id)
+        if parent is None:
+            continue
+        if parent.state("open") == "closed":
+            return _of(False, wanted)
+        deeper = _accessible(graph, parent_id, "true")
+        if deeper is not Truth.TRUE:
+            return _of(False, wanted)
+    return _of(True, wanted)
+
+
+def _relation_truth(graph: SceneGraph, literal: Literal) -> Truth:
+    subject, target = literal.args
+    present = any(
+        r.subject == subject and r.object == target and r.predicate == literal.predicate
+        for r in graph.relations
+    )
+    if present:
+        return _of(True, literal.value)
+    subject_node, target_node = graph.get(subject), graph.get(target)
+    if subject_node is None or target_node is None:
+        return Truth.UNOBSERVED
+    if literal.predicate != "held_by" and target in graph.hidden and not graph.parents(subject):
+        return Truth.UNOBSERVED
+    return _of(False, literal.value)

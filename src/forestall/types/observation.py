@@ -1,0 +1,136 @@
+"""What the robot sees and feels at one moment.
+
+World frame everywhere: right-handed, metres, z up. Camera frame: x right, y down, z forward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.errors import PerceptionError
+
+Rgb = npt.NDArray[np.uint8]
+Depth = npt.NDArray[np.float32]
+Pose = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """Pinhole intrinsics in pixels."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @classmethod
+    def from_vertical_fov(cls, width: int, height: int, fov_deg: float) -> Intrinsics:
+        """Square pixels, principal point at the image centre."""
+        f = 0.5 * height / float(np.tan(np.deg2rad(fov_deg) / 2))
+        return cls(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection:
+    """One instance mask: what a segmenter found.
+
+    `mask` is (H, W) bool. `instance` is a name that stays the same over frames when the segmenter
+    tracks instances (for example "Mug-1"), otherwise None. `score` is in [0, 1].
+    """
+
+    category: str
+    mask: Mask
+    instance: str | None = None
+    score: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One RGB-D picture.
+
+    Args:
+        rgb: (H, W, 3) uint8.
+        depth_m: (H, W) float32 z-depth in metres, 0 where nothing returned.
+        intrinsics: pinhole camera.
+        camera_to_world: (4, 4) float64.
+        instance_ids: optional (H, W) int32, index into `instance_names`, -1 for none. This is an
+            instance *segmentation* (as simulators and trackers deliver); it carries names and
+            categories of what is in view and no state of it.
+        instance_names: instance names such as "Mug-1", by index.
+        detections: masks that came with the frame from outside, if any.
+
+    Raises:
+        PerceptionError: a shape, type or value that cannot be used.
+    """
+
+    rgb: Rgb
+    depth_m: Depth
+    intrinsics: Intrinsics
+    camera_to_world: Pose
+    instance_ids: npt.NDArray[np.int32] | None = None
+    instance_names: tuple[str, ...] = ()
+    detections: tuple[Detection, ...] | None = None
+
+    def __post_init__(self) -> None:
+        size = (self.intrinsics.height, self.intrinsics.width)
+        if self.rgb.shape != (*size, 3) or self.rgb.dtype != np.uint8:
+            raise PerceptionError(
+                f"rgb must be {(*size, 3)} uint8, got {self.rgb.shape} {self.rgb.dtype}"
+            )
+        if self.depth_m.shape != size or self.depth_m.dtype != np.float32:
+            raise PerceptionError(
+                f"depth_m must be {size} float32, got {self.depth_m.shape} {self.depth_m.dtype}"
+            )
+        if not bool(np.isfinite(self.depth_m).all()):
+            bad = int((~np.isfinite(self.depth_m)).sum())
+            raise PerceptionError(
+                f"depth_m has {bad} NaN or infinite values; write 0 where nothing returned"
+            )
+        if bool((self.depth_m < 0).any()):
+            raise PerceptionError("depth_m has negative values; z-depth is metres in front")
+        if self.camera_to_world.shape != (4, 4) or not np.isfinite(self.camera_to_world).all():
+            raise PerceptionError("camera_to_world must be a finite (4, 4) matrix")
+        rotation = self.camera_to_world[:3, :3]
+        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
+            raise PerceptionError("camera_to_world has no rotation matrix in its upper left")
+        if self.instance_ids is not None and self.instance_ids.shape != size:
+            raise PerceptionError(f"instance_ids must be {size}, got {self.instance_ids.shape}")
+        for d in self.detections or ():
+            if d.mask.shape != size or d.mask.dtype != np.bool_:
+                raise PerceptionError(
+                    f"the mask of {d.instance or d.category} must be {size} bool, "
+                    f"got {d.mask.shape} {d.mask.dtype}"
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class GripperState:
+    """The robot's own sense of its hand.
+
+    `holding` is the instance name of what is held as the robot knows it, None for an empty hand.
+    `position_world_m` is where the hand is.
+    """
+
+    holding: str | None
+    position_world_m: Vec3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """One or more frames taken at one boundary, newest last, with gripper and clock."""
+
+    frames: tuple[Frame, ...]
+    gripper: GripperState
+    time_s: float
+    robot_position_world_m: Vec3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not self.frames:
+            raise PerceptionError("an observation needs at least one frame")

@@ -1,0 +1,58 @@
+"""What the episode loop hands to a strategy, and what it gets back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+from forestall.types.plan import Plan, Subtask
+from forestall.types.task import Task
+from forestall.types.verdict import Decision, Diagnosis, Reference, Replan, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class BoundaryContext:
+    """Everything a strategy may know at one boundary; no simulator truth.
+
+    Args:
+        task: the task with its goal.
+        plan: the plan being executed.
+        index: index in `plan` of the subtask that comes next.
+        done: how many subtasks were executed in this episode.
+        subtask: that subtask, grounded to instance names where they are known.
+        graph: the whole fused scene graph.
+        scoped: the part that concerns the subtask.
+        observation: the newest observation.
+        references: retrieved demonstrations (filled by strategies that use them).
+        looks: how many times the robot looked at this boundary (1 at first).
+        replans: how many plans were made in this episode so far.
+    """
+
+    task: Task
+    plan: Plan
+    index: int
+    done: int
+    subtask: Subtask
+    graph: SceneGraph
+    scoped: SceneGraph
+    observation: Observation
+    references: tuple[Reference, ...] = ()
+    looks: int = 1
+    replans: int = 0
+
+    def remaining(self) -> tuple[Subtask, ...]:
+        """What is left of the plan, this subtask first (not grounded)."""
+        return self.plan.subtasks[self.index :]
+
+
+@dataclass(frozen=True, slots=True)
+class StrategyAnswer:
+    """Go on, look again, go on with another plan, or stop."""
+
+    decision: Decision
+    verdict: Verdict | None = None
+    diagnosis: Diagnosis | None = None
+    replan: Replan | None = None
+    why: str = ""
+    seconds: tuple[tuple[str, float], ...] = ()  # compute by phase: retrieve, compare, ...

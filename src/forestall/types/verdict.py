@@ -1,0 +1,167 @@
+"""What the comparison of observed and expected graphs says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from forestall.types.facts import Literal, Truth
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Plan, Subtask
+
+
+class Decision(Enum):
+    """What a strategy or a detector asks for at a boundary."""
+
+    PROCEED = "proceed"
+    LOOK_AGAIN = "look_again"
+    REPLAN = "replan"
+    STOP = "stop"
+
+
+class Calibration(Enum):
+    """Where a threshold comes from."""
+
+    FIXED = "fixed"
+    CALIBRATED = "calibrated"
+    UNCALIBRATED = "uncalibrated"
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A retrieved demonstration step: its graph just before the subtask."""
+
+    demonstration: str  # id of the demonstration
+    task: str
+    index: int
+    subtask: Subtask
+    similarity: float  # of the subtask texts
+    graph: SceneGraph
+    later: tuple[Subtask, ...] = ()  # what the demonstration did afterwards, this step first
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreParts:
+    """The paper's score (Eqs. 1-3) and its parts; None where a part is switched off."""
+
+    score: float
+    node: float | None
+    edge: float | None
+    structure: float | None
+
+
+class Change(Enum):
+    """Kinds of difference between an expected and an observed graph."""
+
+    MISSING_OBJECT = "missing object"
+    EXTRA_OBJECT = "extra object"
+    STATE = "state"
+    MISSING_RELATION = "missing relation"
+    EXTRA_RELATION = "extra relation"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Discrepancy:
+    """One readable difference: what was expected, what was observed."""
+
+    change: Change = field(compare=False)
+    subject: str  # the observed node id, or the expected one for what is missing
+    expected: str
+    observed: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Precondition:
+    """A lifted literal that held in the demonstrations before a skill.
+
+    `literal` uses ?object and ?target (and category names for other things). `support` of `total`
+    demonstrations had it true; the others had it unobserved or false.
+    """
+
+    skill: str
+    literal: Literal
+    support: int
+    total: int
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A mined precondition that does not hold now, ground on the observed graph."""
+
+    precondition: Precondition
+    literal: Literal  # ground
+    truth: Truth  # FALSE or UNOBSERVED
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A detector's answer at one boundary."""
+
+    decision: Decision
+    detector: str
+    score: float | None  # None: no reference to compare with
+    threshold: float
+    calibration: Calibration
+    parts: ScoreParts | None = None
+    nearest: Reference | None = None
+    matches: tuple[tuple[str, str], ...] = ()  # (observed id, expected id in the nearest)
+    discrepancies: tuple[Discrepancy, ...] = ()
+    references: int = 0
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """Why the scene does not fit, and what must change.
+
+    `must_change` are ground literals that should hold and do not; `must_stay` hold and should be
+    kept. An empty `must_change` means: nothing was found that must change.
+    """
+
+    cause: str
+    must_change: tuple[Literal, ...]
+    must_stay: tuple[Literal, ...] = ()
+    culprits: tuple[str, ...] = ()  # ids of the objects that the cause speaks about
+    producer: str = ""
+
+
+class ReplanOutcome(Enum):
+    """How a replanning attempt ended; the cases are told apart on purpose."""
+
+    SOLVED = "solved"
+    NOTHING_TO_CHANGE = "nothing to change"
+    UNSOLVABLE = "unsolvable"  # proven on the observed state
+    TIMEOUT = "timeout"
+    REJECTED = "rejected"  # a plan was made and the validator refused it
+    UNSUPPORTED = "unsupported"  # the goal cannot be expressed for this engine
+
+
+@dataclass(frozen=True, slots=True)
+class PlanCheck:
+    """The validator's answer: does the plan run on the observed state and reach the goal?
+
+    `step` is the index of the first step that cannot run (None if all run), `reason` the condition
+    it lacks in words, `lacking` the same as literals. `unmet` are goal literals false at the end.
+    """
+
+    ok: bool
+    step: int | None = None
+    reason: str = ""
+    lacking: tuple[Literal, ...] = ()
+    unmet: tuple[Literal, ...] = ()
+    assumed: tuple[Literal, ...] = ()  # unobserved facts that the plan relies on
+
+
+@dataclass(frozen=True, slots=True)
+class Replan:
+    """A replanning attempt and its plan for the rest of the task."""
+
+    outcome: ReplanOutcome
+    plan: Plan | None = None
+    check: PlanCheck | None = None
+    producer: str = ""
+    expanded: int = 0  # search nodes
+    seconds: float = 0.0
+    note: str = ""

@@ -1,0 +1,224 @@
+"""The household vocabulary: categories, their attributes, and which thing goes where.
+
+Read from `data/vocabulary.toml` and extended by task files. Everything that must know "a mug can
+be filled" or "a plate goes into a microwave" asks here: the household, perception (which states to
+look for), planning (the skill domain) and the checking of task files.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from forestall.errors import InputError, UnknownNameError
+from forestall.types.facts import category_of
+
+ATTRIBUTES: dict[str, tuple[str, ...]] = {
+    "open": ("closed", "open"),
+    "toggled": ("off", "on"),
+    "filled": ("empty", "water", "coffee", "wine"),
+    "dirty": ("clean", "dirty"),
+    "sliced": ("whole", "sliced"),
+    "broken": ("intact", "broken"),
+    "cooked": ("raw", "cooked"),
+    "temperature": ("room", "hot", "cold"),
+}
+"""Attribute → its values; the first is the default of a new object."""
+
+
+@dataclass(frozen=True, slots=True)
+class Receptacle:
+    """How a category takes other things.
+
+    Args:
+        relation: "inside" or "on_top_of", the relation of its contents to it.
+        accepts: categories that it takes; ("*",) takes every pickupable category.
+        refuses: categories that it does not take although `accepts` would.
+        capacity: how many things fit; None: as long as there is space.
+    """
+
+    relation: str
+    accepts: tuple[str, ...]
+    refuses: tuple[str, ...] = ()
+    capacity: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """What a thing does to its contents by itself, after every skill, while it is on.
+
+    Args:
+        acts_on: category whose contents it works on (same number); None: its own contents.
+        fills: liquid that it puts into empty fillable contents.
+        cleans: whether it cleans dirty contents.
+        heats: whether contents, and what is in them, become hot.
+        cools: whether contents, and what is in them, become cold.
+        cooks: whether contents, and what is in them, become cooked.
+        cooks_only: categories that it cooks; empty: all that can be cooked.
+        cooks_not: categories that it heats but does not cook.
+        always: it works without being turned on (a fridge), while it is closed.
+        brews: brewing into a dirty or filled vessel spoils it.
+        needs_closed: it cannot be turned on while open, nor opened while on.
+        needs_held: category that must be held to turn it on.
+    """
+
+    acts_on: str | None = None
+    fills: str | None = None
+    cleans: bool = False
+    heats: bool = False
+    cools: bool = False
+    cooks: bool = False
+    cooks_only: tuple[str, ...] = ()
+    cooks_not: tuple[str, ...] = ()
+    always: bool = False
+    brews: bool = False
+    needs_closed: bool = False
+    needs_held: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Category:
+    """One category of things.
+
+    `food` marks what can be spoiled by dirt, liquid or company; `slices` is how many slices
+    slicing makes.
+    """
+
+    name: str
+    attributes: tuple[str, ...] = ()
+    pickupable: bool = False
+    fixture: bool = False
+    receptacle: Receptacle | None = None
+    device: Device | None = None
+    food: bool = False
+    slices: int = 3
+    slices_into: str | None = None
+    cracks_into: str | None = None
+    drains: bool = False  # liquid poured into it is gone
+    controls: str | None = None  # a knob: category that it turns on and off, same number
+    large: bool = False  # fills a plate on its own
+    fragile: bool = False  # breaks when dropped
+    shape: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    defaults: tuple[tuple[str, str], ...] = ()
+    aliases: tuple[str, ...] = ()
+    words: str = ""  # how a person calls it
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """Every category by name."""
+
+    categories: Mapping[str, Category] = field(hash=False)
+
+    def __getitem__(self, name: str) -> Category:
+        """The category of a category or instance name, aliases included.
+
+        Raises:
+            UnknownNameError: no such category.
+        """
+        found = self.find(name)
+        if found is None:
+            raise UnknownNameError("object category", category_of(name), self.categories)
+        return found
+
+    def find(self, name: str) -> Category | None:
+        """Like indexing, but None where there is no such category."""
+        return self.categories.get(category_of(self.canonical(name)))
+
+    def canonical(self, name: str) -> str:
+        """Replace an alias: "SinkBasin" → "Sink", "SinkBasin-2" → "Sink-2"."""
+        head = category_of(name)
+        if head in self.categories:
+            return name
+        for category in self.categories.values():
+            if head in category.aliases:
+                return category.name + name[len(head) :]
+        return name
+
+    def accepts(self, receptacle: str, thing: str) -> bool:
+        """Whether a receptacle (name or category) takes a thing (name or category)."""
+        r = self[receptacle].receptacle
+        item = self[thing]
+        if r is None or item.name in r.refuses or item.name == self[receptacle].name:
+            return False
+        return item.name in r.accepts or ("*" in r.accepts and item.pickupable)
+
+    def default_states(self, name: str) -> dict[str, str]:
+        """Attribute → value of a new object."""
+        category = self[name]
+        states = {a: ATTRIBUTES[a][0] for a in category.attributes}
+        return states | dict(category.defaults)
+
+    def encloses(self, name: str) -> bool:
+        """Whether contents cannot be seen or reached while it is closed."""
+        category = self[name]
+        return (
+            category.receptacle is not None
+            and category.receptacle.relation == "inside"
+            and "open" in category.attributes
+        )
+
+    def extended(self, more: Mapping[str, Category]) -> Vocabulary:
+        """This vocabulary with further categories.
+
+        New pickupable categories are taken wherever "*" is accepted.
+        """
+        return replace(self, categories={**self.categories, **more})
+
+
+def parse_category(name: str, data: Mapping[str, Any]) -> Category:
+    """Build one category from its TOML table.
+
+    Raises:
+        InputError: an unknown field, attribute or value.
+    """
+    fields = dict(data)
+    unknown = set(fields) - set(Category.__dataclass_fields__) - {"name"}
+    if unknown:
+        raise InputError(f"category {name}: unknown field {', '.join(sorted(unknown))}")
+    for attribute in fields.get("attributes", ()):
+        if attribute not in ATTRIBUTES:
+            raise UnknownNameError(f"attribute of {name}", attribute, ATTRIBUTES)
+    defaults = tuple(sorted(fields.pop("defaults", {}).items()))
+    for attribute, value in defaults:
+        if value not in ATTRIBUTES.get(attribute, ()):
+            raise UnknownNameError(f"{attribute} of {name}", value, ATTRIBUTES.get(attribute, ()))
+    receptacle = fields.pop("receptacle", None)
+    if receptacle is not None:
+        receptacle = Receptacle(
+            relation=receptacle["relation"],
+            accepts=tuple(receptacle["accepts"]),
+            refuses=tuple(receptacle.get("refuses", ())),
+            capacity=receptacle.get("capacity"),
+        )
+        if receptacle.relation not in ("inside", "on_top_of"):
+            raise UnknownNameError(
+                f"relation of {name}", receptacle.relation, ("inside", "on_top_of")
+            )
+    device = fields.pop("device", None)
+    if device is not None:
+        unknown = set(device) - set(Device.__dataclass_fields__)
+        if unknown:
+            raise InputError(f"device of {name}: unknown field {', '.join(sorted(unknown))}")
+        values: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in device.items()
+        }
+        device = Device(**values)
+    lists: dict[str, Any] = {
+        k: tuple(fields.pop(k)) for k in ("attributes", "aliases") if k in fields
+    }
+    return Category(
+        name=name, defaults=defaults, receptacle=receptacle, device=device, **lists, **fields
+    )
+
+
+@cache
+def household() -> Vocabulary:
+    """The vocabulary that the project ships."""
+    text = files("forestall").joinpath("data/vocabulary.toml").read_text(encoding="utf-8")
+    tables = tomllib.loads(text)["categories"]
+    return Vocabulary({name: parse_category(name, table) for name, table in tables.items()})
