@@ -68,6 +68,41 @@ class Disturbance(Protocol):
         """Let go of the held object where the robot is; its name, None for an empty hand."""
 
 
+class World(Protocol):
+    """Geometry of the embedded household: knows places and looks, not meanings or rules.
+
+    Things are named by instance ("Mug-1"). What was placed on or in a thing is attached to it and
+    moves with it.
+    """
+
+    def drive_to(self, name: str) -> float:
+        """Drive to where `name` can be reached and face it; returns the simulated seconds."""
+
+    def within_reach(self, name: str) -> bool:
+        """Whether `name` can be reached from where the robot stands."""
+
+    def blocker(self, name: str) -> str | None:
+        """What stands between the robot's hand and `name` on the same support, if anything."""
+
+    def has_room(self, thing: str, receptacle: str) -> bool:
+        """Whether there is a free spot for `thing` on or in `receptacle`."""
+
+    def place(self, thing: str, receptacle: str) -> None:
+        """Put `thing` at a free spot on or in `receptacle`, resting on it, and attach it."""
+
+    def hold(self, thing: str) -> None:
+        """Move `thing` (with what is attached to it) into the gripper."""
+
+    def drop(self, thing: str) -> None:
+        """Let `thing` (with what is attached to it) fall from the gripper to the floor nearby."""
+
+    def show(self, name: str, attribute: str, value: str) -> None:
+        """Make a state visible (door angle, liquid, dirt, glow, ...); unknown pairs are ignored."""
+
+    def replace(self, old: str, new: Sequence[str]) -> None:
+        """Take `old` away and put prepared things (its slices, its cracked egg) at its place."""
+
+
 class Renderer(Protocol):
     """Draws one frame of a compiled MuJoCo model (embedded household only)."""
 
