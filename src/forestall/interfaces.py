@@ -176,7 +176,7 @@ class Retriever(Protocol):
     """Context-aware reference retrieval (paper, Sec. 3)."""
 
     def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
-        """References for a subtask, best first; `done` is how many subtasks were executed."""
+        """References for a subtask, best first; `done` is the position in the nominal plan."""
 
 
 class GraphScorer(Protocol):

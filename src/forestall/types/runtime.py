@@ -19,7 +19,8 @@ class BoundaryContext:
         task: the task with its goal.
         plan: the plan being executed.
         index: index in `plan` of the subtask that comes next.
-        done: how many subtasks were executed in this episode.
+        done: how far the task has come, as a position in its nominal plan (a repair keeps the
+            position at which the plan will be taken up again).
         subtask: that subtask, grounded to instance names where they are known.
         graph: the whole fused scene graph.
         scoped: the part that concerns the subtask.

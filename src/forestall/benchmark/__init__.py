@@ -1,0 +1,1 @@
+"""Tasks, scenarios, faults, goal checks and measurements; sees the simulator's truth."""

@@ -1,0 +1,268 @@
+"""Task and scenario files: one documented TOML format, validated, with a JSON schema.
+
+Calls: command line and build → here → types. A task file holds the goal, the nominal plan, what
+the scene needs, and, when it speaks of things that the project does not know, their categories. A
+scenario file names a task and adds faults. Both are checked against the vocabulary when loaded.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from forestall.benchmark.faults import Fault
+from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.types.facts import DERIVED, RELATIONS, category_of, is_instance
+from forestall.types.facts import Literal as Fact
+from forestall.types.plan import Plan
+from forestall.types.scene import ObjectNeed, SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.vocabulary import ATTRIBUTES, Vocabulary, household, parse_category
+
+M = TypeVar("M", bound=BaseModel)
+_NAME = r"^[a-z0-9]+(-[a-z0-9]+)*$"
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class GoalFile(_Model):
+    """The goal table: what must hold in the end, and what must never have happened."""
+
+    text: str
+    variables: dict[str, str] = Field(default_factory=dict)
+    all: list[str] = Field(min_length=1)
+    never: list[str] = Field(default_factory=list)
+    weak: list[str] = Field(default_factory=list)
+
+
+class ObjectFile(_Model):
+    """One object that the scene must hold."""
+
+    category: str
+    id: str | None = None
+    places: list[str] = Field(default_factory=list)
+    states: dict[str, str] = Field(default_factory=dict)
+    in_front_of: str | None = None
+
+
+class SceneFile(_Model):
+    """The scene table."""
+
+    room: Literal["kitchen", "living-room"] = "kitchen"
+    clutter: tuple[int, int] = (2, 6)
+    objects: list[ObjectFile] = Field(default_factory=list)
+    fixtures: dict[str, dict[str, str]] = Field(default_factory=dict)
+
+
+class TaskFile(_Model):
+    """A task file."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    plan: list[str] = Field(min_length=1)
+    goal: GoalFile
+    scene: SceneFile = SceneFile()
+    categories: dict[str, dict[str, Any]] = Field(default_factory=dict)
+
+
+class ScenarioFile(_Model):
+    """A scenario file: a task with faults."""
+
+    name: str = Field(pattern=_NAME)
+    task: str
+    title: str
+    kind: str
+    cause: str
+    faults: list[Fault] = Field(min_length=1)
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedTask:
+    """A task with the vocabulary that it is written in."""
+
+    task: Task
+    vocabulary: Vocabulary
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A named set of faults on a task."""
+
+    name: str
+    task: str
+    title: str
+    kind: str
+    cause: str
+    faults: tuple[Fault, ...]
+
+
+def schemas() -> dict[str, Any]:
+    """JSON schemas of both file formats."""
+    return {
+        "task": TypeAdapter(TaskFile).json_schema(),
+        "scenario": TypeAdapter(ScenarioFile).json_schema(),
+    }
+
+
+def task_names() -> tuple[str, ...]:
+    """Names of the shipped tasks."""
+    return tuple(sorted(name for name, _ in _shipped("tasks")))
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Names of the shipped scenarios."""
+    return tuple(sorted(name for name, _ in _shipped("scenarios")))
+
+
+def load_task(name_or_file: str) -> LoadedTask:
+    """A shipped task by name, or any task file by path.
+
+    Raises:
+        UnknownNameError: neither a shipped task nor a file.
+        FileFormatError: the file is not TOML or has a wrong field.
+        InputError: it speaks of a skill, category, attribute or value that is not known.
+    """
+    source, text = _read("tasks", "task", name_or_file)
+    return _task(source, _validated(TaskFile, source, text))
+
+
+def load_scenario(name_or_file: str) -> Scenario:
+    """A shipped scenario by name, or any scenario file by path.
+
+    Raises:
+        UnknownNameError: neither a shipped scenario nor a file.
+        FileFormatError: the file is not TOML or has a wrong field.
+    """
+    source, text = _read("scenarios", "scenario", name_or_file)
+    data = _validated(ScenarioFile, source, text)
+    return Scenario(data.name, data.task, data.title, data.kind, data.cause, tuple(data.faults))
+
+
+def _shipped(folder: str) -> Iterator[tuple[str, str]]:
+    for entry in files("forestall").joinpath("data", folder).iterdir():
+        if entry.name.endswith(".toml"):
+            yield entry.name.removesuffix(".toml"), entry.read_text(encoding="utf-8")
+
+
+def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str]:
+    if name_or_file.endswith(".toml") or "/" in name_or_file:
+        path = Path(name_or_file)
+        try:
+            return str(path), path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileFormatError(f"cannot read {kind} file {path}: {error}") from error
+    shipped = dict(_shipped(folder))
+    if name_or_file not in shipped:
+        raise UnknownNameError(kind, name_or_file, shipped)
+    return name_or_file, shipped[name_or_file]
+
+
+def _validated(model: type[M], source: str, text: str) -> M:
+    try:
+        return model.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(f"{source}: not valid TOML: {error}") from error
+    except ValidationError as error:
+        problems = "; ".join(
+            f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:4]
+        )
+        raise FileFormatError(f"{source}: {problems}") from error
+
+
+def _task(source: str, data: TaskFile) -> LoadedTask:
+    vocabulary = household()
+    if data.categories:
+        vocabulary = vocabulary.extended(
+            {name: parse_category(name, table) for name, table in data.categories.items()}
+        )
+    try:
+        goal = _goal(data.goal, vocabulary)
+        plan = Plan.parse(data.plan, data.goal.text)
+        for subtask in plan:
+            for name in subtask.args:
+                vocabulary[name]
+        task = Task(data.name, data.title, goal, plan, _scene(data.scene, vocabulary))
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    return LoadedTask(task, vocabulary)
+
+
+def _goal(data: GoalFile, vocabulary: Vocabulary) -> Goal:
+    for variable, category in data.variables.items():
+        if not variable.startswith("?"):
+            raise InputError(f"goal variable {variable!r} must start with '?'")
+        vocabulary[category]
+
+    def facts(texts: list[str]) -> tuple[Fact, ...]:
+        return tuple(_fact(t, data.variables, vocabulary) for t in texts)
+
+    return Goal(
+        text=data.text,
+        variables=tuple(sorted(data.variables.items())),
+        literals=facts(data.all),
+        never=facts(data.never),
+        weak=facts(data.weak),
+    )
+
+
+def _fact(text: str, variables: Mapping[str, str], vocabulary: Vocabulary) -> Fact:
+    fact = Fact.parse(text)
+    if fact.predicate in ATTRIBUTES:
+        if fact.value not in ATTRIBUTES[fact.predicate]:
+            raise UnknownNameError(
+                f"value of {fact.predicate}", fact.value, ATTRIBUTES[fact.predicate]
+            )
+    elif fact.predicate not in (*RELATIONS, *DERIVED):
+        raise UnknownNameError("fact", fact.predicate, (*ATTRIBUTES, *RELATIONS, *DERIVED))
+    for name in fact.args:
+        if name.startswith("?"):
+            if name not in variables:
+                raise UnknownNameError("goal variable", name, variables)
+        elif name != "gripper":
+            vocabulary[name]
+    return fact
+
+
+def _scene(data: SceneFile, vocabulary: Vocabulary) -> SceneNeeds:
+    if not 0 <= data.clutter[0] <= data.clutter[1]:
+        raise InputError(f"scene.clutter {list(data.clutter)}: write [least, most]")
+    numbers: dict[str, int] = {}
+    objects = []
+    for need in data.objects:
+        category = vocabulary[need.category].name
+        for place in need.places:
+            vocabulary[place]
+        _check_states(category, need.states, vocabulary)
+        numbers[category] = numbers.get(category, 0) + 1
+        objects.append(
+            ObjectNeed(
+                id=need.id or f"{category}-{numbers[category]}",
+                category=category,
+                places=tuple(vocabulary.canonical(p) for p in need.places),
+                states=tuple(sorted(need.states.items())),
+                in_front_of=need.in_front_of,
+            )
+        )
+    overrides = []
+    for name, states in data.fixtures.items():
+        _check_states(name, states, vocabulary)
+        instance = name if is_instance(name) else f"{vocabulary[name].name}-1"
+        overrides += [(instance, a, v) for a, v in sorted(states.items())]
+    return SceneNeeds(data.room, tuple(objects), tuple(overrides), data.clutter)
+
+
+def _check_states(name: str, states: Mapping[str, str], vocabulary: Vocabulary) -> None:
+    category = vocabulary[category_of(name)]
+    for attribute, value in states.items():
+        if attribute not in category.attributes:
+            raise UnknownNameError(f"attribute of {category.name}", attribute, category.attributes)
+        if value not in ATTRIBUTES[attribute]:
+            raise UnknownNameError(f"{attribute} of {name}", value, ATTRIBUTES[attribute])

@@ -1,0 +1,219 @@
+"""Configuration → objects: the one place that imports implementations across families.
+
+Calls: command line → here → runtime, environment, perception, memory, comparison, planning. The
+oracle view of an environment is handed to exactly two places here: the oracle state estimator, when
+that is the one asked for, and the scorer.
+"""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from typing import Any
+
+import forestall
+from forestall.benchmark.faults import Fault, apply_plan_faults, apply_scene_faults, wrap
+from forestall.benchmark.files import LoadedTask, Scenario, load_scenario, load_task
+from forestall.benchmark.goals import TruthGoalChecker
+from forestall.comparison.preconditions import mine, violations
+from forestall.comparison.score import BatchScorer, ScoreConfig
+from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
+from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.envs.kitchen.environment import KitchenEnvironment
+from forestall.errors import InputError
+from forestall.interfaces import Listener, Strategy
+from forestall.memory.retrieval import EmbeddingRetriever
+from forestall.perception.perceiver import GraphPerceiver
+from forestall.planning.validate import GraphValidator
+from forestall.registry import known, load
+from forestall.replanning.symbolic import PlannerReplanner
+from forestall.runtime import Runtime, RuntimeConfig
+from forestall.types.demonstration import Demonstration
+from forestall.types.episode import EpisodeRecord
+from forestall.types.plan import Plan
+from forestall.vocabulary import Vocabulary
+
+
+@dataclass(frozen=True, slots=True)
+class RunConfig:
+    """Everything that a run can be configured with.
+
+    Args:
+        task: name of a shipped task, or a task file.
+        scenario: name of a shipped scenario, or a scenario file; None for an undisturbed run.
+        strategy: see `registry.TABLES`.
+        seed: of the scene.
+        renderer: "auto", "embree", "rays" or "gl".
+        segmenter: where masks come from.
+        states: where object states come from.
+        encoder: text encoder of retrieval and node features.
+        threshold: alarm below this score (paper: 0.9).
+        keep_observations: whether pictures stay in the record.
+    """
+
+    task: str
+    scenario: str | None = None
+    strategy: str = "proactive"
+    seed: int = 0
+    renderer: str = "auto"
+    segmenter: str = "instance-ids"
+    states: str = "oracle"
+    encoder: str = "hashed-words"
+    threshold: float = 0.9
+    keep_observations: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A checked run: what the files say, before anything is built."""
+
+    config: RunConfig
+    loaded: LoadedTask
+    scenario: Scenario | None
+
+    @property
+    def plan(self) -> Plan:
+        """The plan to start with: the nominal one with the scenario's changes."""
+        return apply_plan_faults(self.loaded.task.plan, self.faults)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The scenario's faults, none for an undisturbed run."""
+        return () if self.scenario is None else self.scenario.faults
+
+
+def prepare(config: RunConfig) -> Prepared:
+    """Read and check task, scenario and names.
+
+    Raises:
+        InputError: anything that does not fit, each with what would be valid.
+    """
+    loaded = load_task(config.task)
+    load("strategy", config.strategy)
+    scenario = None if config.scenario is None else load_scenario(config.scenario)
+    if scenario is not None and scenario.task != loaded.task.name:
+        raise InputError(
+            f"scenario {scenario.name} is for the task {scenario.task}, not {loaded.task.name}"
+        )
+    if not 0 <= config.threshold <= 1:
+        raise InputError(f"threshold {config.threshold} is not between 0 and 1")
+    if config.seed < 0:
+        raise InputError(f"seed {config.seed} is negative; seeds are 0, 1, 2, ...")
+    return Prepared(config, loaded, scenario)
+
+
+def run_episode(
+    prepared: Prepared,
+    demonstrations: Sequence[Demonstration] | None,
+    listeners: Sequence[Listener] = (),
+) -> EpisodeRecord:
+    """Build everything and run one episode.
+
+    Args:
+        prepared: from `prepare`.
+        demonstrations: the memory; None only for a strategy that uses none.
+        listeners: told what happens.
+    """
+    config, loaded, task = prepared.config, prepared.loaded, prepared.loaded.task
+    needs = apply_scene_faults(task.scene, prepared.faults, loaded.vocabulary)
+    kitchen = KitchenEnvironment(needs, loaded.vocabulary, config.renderer)
+    try:
+        perceiver = GraphPerceiver(
+            load("segmenter", config.segmenter)(),
+            _state_estimator(config.states, kitchen, loaded.vocabulary),
+            loaded.vocabulary,
+        )
+        runtime = Runtime(
+            wrap(kitchen, prepared.faults, kitchen),
+            perceiver,
+            make_strategy(config, loaded.vocabulary, demonstrations),
+            loaded.vocabulary,
+            listeners,
+            RuntimeConfig(keep_observations=config.keep_observations),
+        )
+        return runtime.run(
+            task,
+            prepared.plan,
+            config.seed,
+            None if prepared.scenario is None else prepared.scenario.name,
+            _scorer(kitchen),
+            provenance(config),
+        )
+    finally:
+        kitchen.close()
+
+
+def make_strategy(
+    config: RunConfig, vocabulary: Vocabulary, demonstrations: Sequence[Demonstration] | None
+) -> Strategy:
+    """The strategy with its collaborators."""
+    kind = load("strategy", config.strategy)
+    if config.strategy == "none":
+        return kind()  # type: ignore[no-any-return]
+    if not demonstrations:
+        raise InputError(
+            f"strategy {config.strategy!r} compares with demonstrations, and the memory has none"
+        )
+    encoder = load("encoder", config.encoder)()
+    validator = GraphValidator(vocabulary)
+    return kind(  # type: ignore[no-any-return]
+        EmbeddingRetriever(demonstrations, encoder),
+        make_detector(config, vocabulary),
+        SymbolicReasoner(mine, violations, vocabulary),
+        PlannerReplanner(validator, vocabulary),
+        validator,
+    )
+
+
+def make_detector(config: RunConfig, vocabulary: Vocabulary) -> SceneGraphDetector:
+    """The paper's detector with our default options."""
+    encoder = load("encoder", config.encoder)()
+    return SceneGraphDetector(
+        BatchScorer(ScoreConfig(), encoder), DetectorConfig(threshold=config.threshold)
+    )
+
+
+def provenance(config: RunConfig) -> tuple[tuple[str, Any], ...]:
+    """What is needed to run the same again."""
+    return (
+        ("config", asdict(config)),
+        (
+            "versions",
+            {
+                "forestall": forestall.__version__,
+                "python": sys.version.split()[0],
+                "numpy": version("numpy"),
+                "mujoco": version("mujoco-core"),
+                "platform": platform.platform(),
+            },
+        ),
+    )
+
+
+def _state_estimator(name: str, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> Any:
+    kind = load("states", name)
+    if name == "oracle":
+        return kind(kitchen.oracle.states, vocabulary)
+    if name == "given":
+        raise InputError(
+            f"states 'given' come with a stored observation; a run takes one of: "
+            f"{', '.join(n for n in known('states') if n != 'given')}"
+        )
+    return kind(vocabulary)
+
+
+def _scorer(kitchen: KitchenEnvironment) -> Callable[[EpisodeRecord], EpisodeRecord]:
+    def score(record: EpisodeRecord) -> EpisodeRecord:
+        strict, weak, failures = TruthGoalChecker().check(record.task.goal, kitchen.oracle)
+        return replace(
+            record,
+            success=strict,
+            weak_success=weak,
+            failures=failures,
+            events=kitchen.oracle.events(),
+        )
+
+    return score

@@ -1,0 +1,116 @@
+"""`forestall demos`: record and list demonstrations; and the memory that a run uses."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+if TYPE_CHECKING:
+    from forestall.types.demonstration import Demonstration
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Quiet = Annotated[bool, Parameter(negative="")]
+
+demos = App(name="demos", help="Record and list demonstrations.")
+
+
+@demos.command
+def record(
+    memory: Path,
+    /,
+    *,
+    task: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    kitchens: int = 4,
+    seed: int = 1_000_000,
+    states: str = "oracle",
+    jobs: int | None = None,
+    quiet: Quiet = False,
+) -> int:
+    """Run nominal plans in seeded kitchens and keep the successful runs.
+
+    Args:
+        memory: the demonstration file to add to; made when it does not exist.
+        task: task names or files; all shipped tasks by default.
+        kitchens: demonstrations per task.
+        seed: first seed of the demonstration scenes.
+        states: where object states come from.
+        jobs: how many processes; all cores by default.
+        quiet: no progress bar.
+    """
+    from forestall.benchmark.files import load_task, task_names
+    from forestall.cli.progress import bar
+    from forestall.demonstrations import jobs_for, record_all
+    from forestall.errors import InputError
+    from forestall.memory.store import open_store
+
+    if kitchens < 1:
+        raise InputError(f"--kitchens {kitchens}: at least 1 is needed")
+    names = task or list(task_names())
+    for name in names:
+        load_task(name)
+    todo = jobs_for(names, kitchens, seed, states)
+    with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:
+        count = 0
+        for demonstration in record_all(todo, jobs or os.cpu_count() or 1, feed):
+            store.add(demonstration)
+            count += 1
+    print(f"{count} demonstrations added to {memory}")
+    return 0
+
+
+@demos.command(name="list")
+def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
+    """List the demonstrations of a memory.
+
+    Args:
+        memory: a demonstration file; the ready-made one by default.
+        as_json: print JSON.
+    """
+    loaded, path = load_memory(memory, "oracle", False)
+    rows = [
+        {"id": d.id, "task": d.task, "scene": d.scene, "steps": len(d.steps), **dict(d.perception)}
+        for d in loaded
+    ]
+    if as_json:
+        print(json.dumps({"memory": path, "demonstrations": rows}, indent=2))
+        return 0
+    from forestall.cli.listing import print_table
+
+    print_table(
+        ("id", "task", "scene", "steps", "states from"),
+        [
+            (r["id"], r["task"], r["scene"], str(r["steps"]), str(r.get("state_estimator", "")))
+            for r in rows
+        ],
+    )
+    print(path)
+    return 0
+
+
+def load_memory(memory: Path | None, states: str, quiet: bool) -> tuple[list[Demonstration], str]:
+    """Every demonstration of a memory, and its path.
+
+    Raises:
+        MemoryFileError: see `memory.store`.
+    """
+    from forestall.memory.store import open_store
+
+    path = memory or _ready_made(states, quiet)
+    with open_store(path) as store:
+        return list(store.all()), str(path)
+
+
+def _ready_made(states: str, quiet: bool) -> Path:
+    from forestall.cli.progress import bar
+    from forestall.demonstrations import ready_made
+
+    def announce(text: str) -> None:
+        print(f"forestall: {text}", file=sys.stderr)
+
+    with bar("recording demonstrations", quiet=quiet) as feed:
+        return ready_made(states, announce, feed)

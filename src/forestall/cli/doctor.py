@@ -1,0 +1,105 @@
+"""`forestall doctor`: what works on this machine, and what to install for the rest."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+_EXTRAS = {
+    "planning": (("unified_planning", "up_fast_downward"), "cross-check with Fast Downward"),
+}
+
+
+def doctor(*, as_json: Json = False) -> int:
+    """Try every part and say what works; exit code 1 when something needed does not.
+
+    Args:
+        as_json: print JSON.
+    """
+    rows = [*_needed(), *_optional()]
+    ok = all(r["works"] for r in rows if r["needed"])
+    if as_json:
+        print(json.dumps({"ok": ok, "parts": rows}, indent=2))
+        return 0 if ok else 1
+    for row in rows:
+        mark = "ok     " if row["works"] else ("MISSING" if row["needed"] else "absent ")
+        print(f"{mark}  {row['part']}: {row['detail']}")
+        if not row["works"] and row["hint"]:
+            print(f"         {row['hint']}")
+    print("everything needed works" if ok else "something needed does not work (see MISSING)")
+    return 0 if ok else 1
+
+
+def _row(part: str, works: bool, needed: bool, detail: str, hint: str = "") -> dict[str, Any]:
+    return {"part": part, "works": works, "needed": needed, "detail": detail, "hint": hint}
+
+
+def _needed() -> list[dict[str, Any]]:
+    import sqlite3
+    import tempfile
+    from pathlib import Path
+
+    from forestall.config import cache_dir
+    from forestall.envs.kitchen.rendering.probe import probe_renderers
+    from forestall.errors import ForestallError
+    from forestall.memory.store import open_store
+
+    probes = {p.name: p for p in probe_renderers()}
+    picture = [p for n, p in probes.items() if n != "gl" and p.works]
+    rows = [
+        _row(
+            "picture without a graphics library",
+            bool(picture),
+            True,
+            ", ".join(f"{p.name} ({p.detail})" for p in picture) or "no software renderer works",
+            "pip install --force-reinstall embreex mujoco-core",
+        )
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            with open_store(Path(folder) / "probe.db", create=True):
+                pass
+            rows.append(_row("memory", True, True, f"SQLite {sqlite3.sqlite_version}"))
+        except ForestallError as error:
+            rows.append(_row("memory", False, True, str(error), "free space or use another folder"))
+    folder_ok, detail = _writable(cache_dir())
+    rows.append(
+        _row("cache folder", folder_ok, True, detail, "set FORESTALL_CACHE to a writable folder")
+    )
+    for name in ("embree", "rays", "gl"):
+        if name in probes:
+            p = probes[name]
+            rows.append(_row(f"renderer {name}", p.works, False, p.detail, p.hint))
+    return rows
+
+
+def _writable(folder: Any) -> tuple[bool, str]:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".probe"
+        probe.write_text("x")
+        probe.unlink()
+    except OSError as error:
+        return False, str(error)
+    return True, str(folder)
+
+
+def _optional() -> list[dict[str, Any]]:
+    rows = []
+    for extra, (modules, what) in _EXTRAS.items():
+        works = all(find_spec(m) is not None for m in modules)
+        rows.append(
+            _row(
+                f"extra [{extra}]",
+                works,
+                False,
+                what if works else f"not installed ({what})",
+                f"pip install 'forestall[{extra}]'",
+            )
+        )
+    return rows

@@ -1,0 +1,147 @@
+"""`forestall compare` and `forestall check`: graphs and observations of the user's own."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from forestall.types.graph import SceneGraph
+    from forestall.types.verdict import Diagnosis, Verdict
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+
+def read_graph(path: Path) -> SceneGraph:
+    """A scene graph from a JSON file.
+
+    Raises:
+        FileFormatError: it cannot be read, or is no scene graph.
+        InputError: it contradicts itself (a dangling relation, an id twice).
+    """
+    from forestall.errors import FileFormatError, InputError
+    from forestall.types.graph import SceneGraph
+
+    try:
+        return SceneGraph.from_json(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise FileFormatError(f"cannot read scene graph {path}: {error}") from error
+    except InputError as error:
+        raise type(error)(f"{path}: {error}") from error
+
+
+def compare(observed: Path, expected: Path, /, *, as_json: Json = False) -> int:
+    """Compare two scene graphs: the paper's score, its parts, and the readable difference.
+
+    Args:
+        observed: scene graph of what is (JSON).
+        expected: scene graph of what a demonstration showed (JSON).
+        as_json: print JSON.
+    """
+    from forestall.comparison.score import ScoreConfig
+    from forestall.comparison.score import compare as compare_graphs
+    from forestall.embeddings.hashed import HashedTextEncoder
+
+    result = compare_graphs(
+        read_graph(observed), read_graph(expected), ScoreConfig(), HashedTextEncoder()
+    )
+    parts = result.parts
+    if as_json:
+        print(
+            json.dumps(
+                {
+                    "score": parts.score,
+                    "node": parts.node,
+                    "edge": parts.edge,
+                    "structure": parts.structure,
+                    "matches": [list(m) for m in result.matches],
+                    "discrepancies": [
+                        {"change": d.change.value, "subject": d.subject, "text": d.text}
+                        for d in result.discrepancies
+                    ],
+                },
+                indent=2,
+            )
+        )
+        return 0
+    print(f"score {parts.score:.3f}")
+    for name, value in (("node", parts.node), ("edge", parts.edge), ("structure", parts.structure)):
+        print(f"  {name:10s} {'off' if value is None else f'{value:.3f}'}")
+    for d in result.discrepancies:
+        print(f"  {d.change.value}: {d.text}")
+    return 0
+
+
+def check(
+    folder: Path,
+    /,
+    *,
+    subtask: str,
+    task: str | None = None,
+    memory: Path | None = None,
+    threshold: float = 0.9,
+    as_json: Json = False,
+) -> int:
+    """Judge a stored observation of your own before a subtask; exit code 1 on an alarm.
+
+    Args:
+        folder: the observation (docs/observation-format.md).
+        subtask: what is about to start, e.g. "put_in(Plate, Microwave)".
+        task: the task's name, so that its own demonstrations are preferred.
+        memory: a demonstration file; the ready-made one by default.
+        threshold: alarm when no demonstration reaches this score.
+        as_json: print JSON.
+    """
+    from forestall.cli.demos import load_memory
+    from forestall.stored import judge_stored
+    from forestall.types.verdict import Decision
+
+    demonstrations, path = load_memory(memory, "oracle", as_json)
+    started = time.perf_counter()
+    graph, verdict, diagnosis = judge_stored(folder, subtask, task, demonstrations, threshold)
+    data = _verdict_json(verdict, diagnosis) | {
+        "subtask": str(graph.subtask),
+        "memory": path,
+        "graph": graph.to_json(),
+        "compute_s": time.perf_counter() - started,
+    }
+    if as_json:
+        print(json.dumps(data, indent=2))
+    else:
+        print(f"{verdict.decision.value}: before {graph.subtask}")
+        score = "none" if verdict.score is None else f"{verdict.score:.3f}"
+        print(f"  score {score}, threshold {threshold:.2f}, {verdict.references} references")
+        if verdict.note:
+            print(f"  {verdict.note}")
+        for d in verdict.discrepancies:
+            print(f"  {d.change.value}: {d.text}")
+        if diagnosis is not None:
+            print(f"  cause: {diagnosis.cause}")
+            for fact in diagnosis.must_change:
+                print(f"  must change: {fact}")
+    return 1 if verdict.decision is Decision.REPLAN else 0
+
+
+def _verdict_json(verdict: Verdict, diagnosis: Diagnosis | None) -> dict[str, Any]:
+    return {
+        "decision": verdict.decision.value,
+        "score": verdict.score,
+        "threshold": verdict.threshold,
+        "calibration": verdict.calibration.value,
+        "references": verdict.references,
+        "nearest": None
+        if verdict.nearest is None
+        else {
+            "demonstration": verdict.nearest.demonstration,
+            "task": verdict.nearest.task,
+            "subtask": str(verdict.nearest.subtask),
+        },
+        "discrepancies": [d.text for d in verdict.discrepancies],
+        "note": verdict.note,
+        "cause": None if diagnosis is None else diagnosis.cause,
+        "must_change": [] if diagnosis is None else [str(f) for f in diagnosis.must_change],
+    }

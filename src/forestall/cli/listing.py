@@ -1,0 +1,95 @@
+"""`forestall tasks` and `forestall scenarios`."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Schema = Annotated[bool, Parameter(name="--schema", negative="")]
+
+
+def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
+    """List the shipped tasks.
+
+    Args:
+        as_json: print them as JSON, complete.
+        schema: print the JSON schema of task files instead.
+    """
+    from forestall.benchmark.files import load_task, schemas, task_names
+
+    if schema:
+        print(json.dumps(schemas()["task"], indent=2))
+        return 0
+    loaded = [load_task(name).task for name in task_names()]
+    if as_json:
+        rows = [
+            {
+                "name": t.name,
+                "title": t.title,
+                "goal": t.goal.text,
+                "literals": [str(x) for x in t.goal.literals],
+                "never": [str(x) for x in t.goal.never],
+                "plan": t.plan.texts(),
+                "room": t.scene.room,
+            }
+            for t in loaded
+        ]
+        print(json.dumps(rows, indent=2))
+        return 0
+    print_table(
+        ("task", "goal", "steps"), [(t.name, t.goal.text, str(len(t.plan))) for t in loaded]
+    )
+    return 0
+
+
+def scenarios(*, task: str | None = None, as_json: Json = False, schema: Schema = False) -> int:
+    """List the shipped scenarios.
+
+    Args:
+        task: only those of one task.
+        as_json: print them as JSON, complete.
+        schema: print the JSON schema of scenario files instead.
+    """
+    from forestall.benchmark.files import load_scenario, load_task, scenario_names, schemas
+
+    if schema:
+        print(json.dumps(schemas()["scenario"], indent=2))
+        return 0
+    if task is not None:
+        load_task(task)
+    loaded = [s for s in map(load_scenario, scenario_names()) if task in (None, s.task)]
+    if as_json:
+        rows = [
+            {
+                "name": s.name,
+                "task": s.task,
+                "kind": s.kind,
+                "title": s.title,
+                "cause": s.cause,
+                "faults": [f.model_dump(mode="json", exclude_defaults=False) for f in s.faults],
+            }
+            for s in loaded
+        ]
+        print(json.dumps(rows, indent=2))
+        return 0
+    print_table(
+        ("scenario", "task", "kind", "what goes wrong"),
+        [(s.name, s.task, s.kind, s.cause) for s in loaded],
+    )
+    return 0
+
+
+def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    """Print a plain table with rich."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for number, name in enumerate(header):
+        table.add_column(name, no_wrap=number == 0, style="bold" if number == 0 else None)
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)

@@ -1,0 +1,109 @@
+"""`forestall run`: the main job."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+
+def run(
+    task: str,
+    /,
+    *,
+    scenario: str | None = None,
+    strategy: str = "proactive",
+    seed: int = 0,
+    out: Path | None = None,
+    memory: Path | None = None,
+    states: str = "oracle",
+    renderer: str = "auto",
+    threshold: float = 0.9,
+    as_json: Json = False,
+    quiet: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Run one household task from pixels to a plan that works, and write a page about it.
+
+    Args:
+        task: a task's name (see `forestall tasks`) or a task file.
+        scenario: what goes wrong (see `forestall scenarios`), or a scenario file.
+        strategy: when a run may be interrupted: none, proactive.
+        seed: of the scene.
+        out: folder for the record, its pictures and the page; a new one under runs/ by default.
+        memory: a demonstration file; the ready-made one by default.
+        states: where object states come from: oracle (the simulator's, for ablation).
+        renderer: auto, embree, rays or gl.
+        threshold: alarm when no demonstration reaches this score.
+        as_json: print one record as JSON and nothing else on standard output.
+        quiet: no progress on standard error.
+    """
+    from forestall.build import RunConfig, prepare, run_episode
+    from forestall.report.listeners import ProgressLine
+    from forestall.report.page import write_page
+    from forestall.report.record import RunRecorder, record_json
+
+    config = RunConfig(task, scenario, strategy, seed, renderer, states=states, threshold=threshold)
+    prepared = prepare(config)
+    folder = out or _new_folder(prepared.loaded.task.name, scenario, strategy, seed)
+    demonstrations, used = _memory(strategy, memory, states, quiet)
+    recorder = RunRecorder(folder)
+    listeners = [recorder] if quiet else [recorder, ProgressLine()]
+    record = run_episode(prepared, demonstrations, listeners)
+    page = write_page(record, folder / "index.html")
+    data = record_json(record, page=str(page), images=recorder.images)
+    data["memory"] = used
+    if as_json:
+        print(json.dumps(data, indent=2))
+    else:
+        _summary(data)
+    return 0 if record.success else 1
+
+
+def _memory(
+    strategy: str, memory: Path | None, states: str, quiet: bool
+) -> tuple[list[object] | None, str | None]:
+    if strategy == "none":
+        return None, None
+    from forestall.cli.demos import load_memory
+
+    return load_memory(memory, states, quiet)
+
+
+def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    name = "-".join((task, scenario or "undisturbed", strategy, str(seed), stamp))
+    return Path("runs") / Path(name.replace("/", "_").replace(".toml", ""))
+
+
+def _summary(data: dict[str, object]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+
+    console = Console(highlight=False)
+    good = bool(data["success"])
+    console.print(
+        f"[bold {'green' if good else 'red'}]{'success' if good else 'failed'}[/] "
+        f"{escape(str(data['task']))} · {escape(str(data['scenario'] or 'undisturbed'))} · "
+        f"{data['strategy']} · seed {data['seed']}"
+    )
+    for failure in data["failures"]:  # type: ignore[attr-defined]
+        console.print(f"  not reached: {escape(failure)}")
+    for alarm in data["alarms"]:  # type: ignore[attr-defined]
+        score = "none" if alarm["score"] is None else f"{alarm['score']:.2f}"
+        console.print(
+            f"  alarm before {escape(alarm['subtask'])}: score {score} < "
+            f"{alarm['threshold']:.2f}: {escape(alarm['cause'] or '')}"
+        )
+    total = sum(data["compute_s"].values())  # type: ignore[attr-defined]
+    console.print(
+        f"  {len(data['executed'])} subtasks, {data['replans']} replans, "  # type: ignore[arg-type]
+        f"{data['simulated_s']:.0f} s of robot time, {total:.1f} s of computing; "
+        f"states: {escape(str(data['perception']['state_estimator']))}"  # type: ignore[index]
+    )
+    print(data["page"], file=sys.stdout)

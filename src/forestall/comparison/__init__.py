@@ -1,0 +1,1 @@
+"""Comparison of observed and expected scenes: the paper's score, differences, preconditions."""

@@ -1,0 +1,106 @@
+"""Every open choice of the paper's score (Eqs. 1-3) as a named option.
+
+Read by the rest of this package; calls nothing. Why each default is what it is stands in
+docs/decisions/0003-score-options.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from forestall.errors import InputError, UnknownNameError
+from forestall.types.facts import RELATIONS
+from forestall.vocabulary import ATTRIBUTES
+
+SUPPORTS = ("CounterTop", "DiningTable", "Floor", "Shelf", "TVStand")
+"""Categories on which things merely stand."""
+
+
+class Feature(Enum):
+    """What f(v) of Eq. 1 encodes."""
+
+    TEXT = "text"  # one embedding of "category (states)"
+    PARTS = "parts"  # an embedding of the category and one of the states, weighed apart
+
+
+class DegreeScale(Enum):
+    """D of Eq. 3, by which a difference of degrees is divided."""
+
+    LARGEST = "largest"  # the largest degree in the two graphs
+    PAIR = "pair"  # the larger degree of the two matched nodes
+    NODES = "nodes"  # one less than the number of nodes of the larger graph
+
+
+class StructureCount(Enum):
+    """N of Eq. 3, over which differences are averaged."""
+
+    MATCHED = "matched"  # matched pairs
+    UNION = "union"  # all nodes of both graphs, an unmatched one differing fully
+
+
+class EmptyRule(Enum):
+    """What a part is worth when both graphs have nothing for it to compare (0/0)."""
+
+    ONE = "one"  # nothing expected, nothing there: full agreement
+    SKIP = "skip"  # the part is left out of the mean
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreConfig:
+    """How two graphs are scored.
+
+    Args:
+        feature: what a node's feature encodes.
+        state_weight: share of the states in the feature "parts".
+        floor: a pair of nodes below this cosine stays unmatched.
+        state_changes_match: whether a node may match one of the same category whose known states
+            differ; unobserved states agree with anything.
+        attributes: states that count. Temperature does not: a camera cannot see it.
+        subtask_node: whether the subtask node counts; it matches only the other subtask node.
+        degree_scale: D.
+        structure_count: N.
+        predicates: relations that count.
+        empty: what 0/0 is worth.
+        generic_supports: categories in `supports` compare as one category "support".
+        merge_supports: and all supports of a graph are one node, so that it does not matter which
+            thing stands on which of them. Without effect unless `generic_supports`.
+        supports: the categories meant by the two options above.
+        instance_categories: nodes of these categories match only when their numbers are equal or
+            both are the same argument of their subtasks.
+        use_node: ablation: whether S_node counts.
+        use_edge: ablation: whether S_edge counts.
+        use_structure: ablation: whether S_struc counts.
+
+    Raises:
+        InputError: a number out of range, an unknown name, or no part left.
+    """
+
+    feature: Feature = Feature.PARTS
+    state_weight: float = 0.3
+    floor: float = 0.6
+    state_changes_match: bool = False
+    attributes: tuple[str, ...] = tuple(a for a in ATTRIBUTES if a != "temperature")
+    subtask_node: bool = True
+    degree_scale: DegreeScale = DegreeScale.LARGEST
+    structure_count: StructureCount = StructureCount.MATCHED
+    predicates: tuple[str, ...] = ("blocking", "held_by", "inside", "on_top_of")
+    empty: EmptyRule = EmptyRule.ONE
+    generic_supports: bool = True
+    merge_supports: bool = True
+    supports: tuple[str, ...] = SUPPORTS
+    instance_categories: tuple[str, ...] = ("StoveBurner", "StoveKnob")
+    use_node: bool = True
+    use_edge: bool = True
+    use_structure: bool = True
+
+    def __post_init__(self) -> None:
+        if not (self.use_node or self.use_edge or self.use_structure):
+            raise InputError("at least one of use_node, use_edge, use_structure must be on")
+        if not 0 < self.floor <= 1:
+            raise InputError(f"floor {self.floor} is not above 0 and at most 1")
+        if not 0 <= self.state_weight < 1:
+            raise InputError(f"state_weight {self.state_weight} is not at least 0 and below 1")
+        for predicate in self.predicates:
+            if predicate not in RELATIONS:
+                raise UnknownNameError("relation", predicate, RELATIONS)

@@ -1,0 +1,156 @@
+"""Recording demonstrations, and the ready-made memory that is made on first use.
+
+Calls: command line → here → build, memory. Demonstration scenes have seeds of their own range, so
+that no evaluation scene is ever among them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from importlib.resources import files
+from multiprocessing import get_context
+from pathlib import Path
+
+import forestall
+from forestall.benchmark.files import task_names
+from forestall.build import RunConfig, prepare, run_episode
+from forestall.config import cache_dir
+from forestall.errors import ForestallError
+from forestall.memory.recording import demonstration_from
+from forestall.memory.store import open_store
+from forestall.types.demonstration import Demonstration
+
+DEMONSTRATION_SEEDS = 1_000_000
+"""First seed of demonstration scenes; evaluation seeds are far below."""
+
+KITCHENS_PER_TASK = 4
+"""Successful demonstrations per task (paper, Sec. 4 "Experimental Pipeline")."""
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingJob:
+    """One demonstration to record: the first succeeding seed of a range of its own."""
+
+    task: str
+    first_seed: int
+    tries: int = 5
+    states: str = "oracle"
+    renderer: str = "auto"
+
+
+def jobs_for(
+    tasks: Sequence[str], kitchens: int, seed: int = DEMONSTRATION_SEEDS, states: str = "oracle"
+) -> list[RecordingJob]:
+    """`kitchens` jobs for each task, each with scenes of its own."""
+    return [
+        RecordingJob(task, seed + 1000 * t + 10 * k, states=states)
+        for t, task in enumerate(tasks)
+        for k in range(kitchens)
+    ]
+
+
+def record_one(job: RecordingJob) -> Demonstration:
+    """Run a nominal plan in seeded scenes until one run succeeds.
+
+    Raises:
+        ForestallError: no seed of the range succeeded.
+    """
+    why: tuple[str, ...] = ()
+    for seed in range(job.first_seed, job.first_seed + job.tries):
+        config = RunConfig(
+            job.task,
+            strategy="none",
+            seed=seed,
+            states=job.states,
+            renderer=job.renderer,
+            keep_observations=False,
+        )
+        record = run_episode(prepare(config), None)
+        demonstration = demonstration_from(record, forestall.__version__)
+        if demonstration is not None:
+            return demonstration
+        why = record.failures
+    raise ForestallError(
+        f"no successful run of {job.task} in seeds {job.first_seed} to "
+        f"{job.first_seed + job.tries - 1}: {'; '.join(why)}"
+    )
+
+
+def record_all(
+    jobs: Sequence[RecordingJob], workers: int, progress: Progress | None = None
+) -> Iterator[Demonstration]:
+    """Record in the order of the jobs, whatever the number of workers is."""
+    finished = 0
+
+    def done(job: RecordingJob) -> None:
+        nonlocal finished
+        finished += 1
+        if progress is not None:
+            progress(finished, len(jobs), job.task)
+
+    if workers <= 1 or len(jobs) == 1:
+        for job in jobs:
+            demonstration = record_one(job)
+            done(job)
+            yield demonstration
+        return
+    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(record_one, job): job for job in jobs}
+        for future in as_completed(futures):
+            future.result()
+            done(futures[future])
+        for future in futures:
+            yield future.result()
+
+
+def ready_made(
+    states: str = "oracle",
+    announce: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> Path:
+    """The path of the ready-made memory, made now if it is not in the cache.
+
+    It is keyed by what it depends on: version, sources of the household and perception, task
+    files, states and the number of kitchens.
+    """
+    path = cache_dir() / "memory" / f"ready-made-{_key(states)}.db"
+    if path.exists():
+        return path
+    jobs = jobs_for(task_names(), KITCHENS_PER_TASK, states=states)
+    if announce is not None:
+        announce(
+            f"first use: recording {len(jobs)} demonstrations of the ten tasks "
+            f"(once; kept in {path.parent})"
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.part")
+    try:
+        with open_store(partial, create=True) as store:
+            for demonstration in record_all(jobs, workers or os.cpu_count() or 1, progress):
+                store.add(demonstration)
+        os.replace(partial, path)
+    finally:
+        for leftover in path.parent.glob(f"{partial.name}*"):
+            leftover.unlink(missing_ok=True)
+    return path
+
+
+def _key(states: str) -> str:
+    digest = hashlib.blake2b(digest_size=8)
+    digest.update(json.dumps([forestall.__version__, states, KITCHENS_PER_TASK]).encode())
+    root = files("forestall")
+    for folder in ("envs/kitchen", "envs/kitchen/rendering", "perception", "types", "data/tasks"):
+        for entry in sorted(root.joinpath(folder).iterdir(), key=lambda e: e.name):
+            if entry.name.endswith((".py", ".toml")):
+                digest.update(entry.name.encode())
+                digest.update(entry.read_bytes())
+    digest.update(root.joinpath("data/vocabulary.toml").read_bytes())
+    return digest.hexdigest()

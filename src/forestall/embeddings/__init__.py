@@ -1,0 +1,5 @@
+"""Encoders of texts (and later images); each stands behind a Protocol of `interfaces.py`."""
+
+from forestall.embeddings.hashed import HashedTextEncoder
+
+__all__ = ["HashedTextEncoder"]

@@ -1,0 +1,1 @@
+"""Worlds in which a robot looks and acts: the embedded household and adapters to others."""

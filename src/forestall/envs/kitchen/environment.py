@@ -1,0 +1,225 @@
+"""The embedded household as an `Environment`: scene, camera, skills, effects, clock.
+
+Joins the geometry (`World` with a camera), a renderer and the truth (`Household`). Calls point
+downwards: `execute` → skills → household → world. Ground truth leaves only through `oracle`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
+from forestall.envs.kitchen import effects
+from forestall.envs.kitchen.household import Household, Placed
+from forestall.envs.kitchen.skills import Robot, SkillTimes, perform
+from forestall.errors import ForestallError
+from forestall.interfaces import Renderer, World
+from forestall.types.episode import Event, SkillOutcome, SkillStatus
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
+from forestall.types.plan import Subtask
+from forestall.types.scene import SceneNeeds
+from forestall.vocabulary import Vocabulary
+
+SCAN_FRAMES = 7
+"""Views of a full turn; 51° apart at 75° of horizontal view, so that each overlaps the next."""
+
+SCAN_TILT_RAD = math.radians(25.0)
+AHEAD_TILT_RAD = math.radians(15.0)
+
+
+class Stage(World, Protocol):
+    """What the environment asks of a world beyond moving things: its contents and its camera."""
+
+    @property
+    def instances(self) -> Iterable[Placed]: ...  # noqa: D102
+    @property
+    def data(self) -> Any: ...  # noqa: D102
+    @property
+    def robot_position_world_m(self) -> Vec3: ...  # noqa: D102
+    @property
+    def gripper_position_world_m(self) -> Vec3: ...  # noqa: D102
+
+    def look_at(self, point_world_m: Vec3) -> npt.NDArray[np.float64]:
+        """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
+
+    def camera_to_world(self, pan_rad: float, tilt_rad: float) -> npt.NDArray[np.float64]:
+        """Camera-to-world pose (4, 4); pan to the left and tilt downwards are positive."""
+
+    def reset(self) -> None:
+        """Everything back to the start of the scene."""
+
+
+Build = Callable[[SceneNeeds, int, Vocabulary], Stage]
+MakeRenderer = Callable[[Stage, Intrinsics], Renderer]
+
+
+class KitchenOracle:
+    """Ground truth of the embedded household, for the benchmark and the oracle perception."""
+
+    def __init__(self, current: Callable[[], Household]) -> None:
+        self._current = current
+
+    def truth(self) -> SceneGraph:
+        """The complete state: every object, every state, containment, what is held."""
+        return self._current().truth()
+
+    def states(self, instance: str) -> Mapping[str, str]:
+        """True attribute values of one instance, empty if there is no such instance now."""
+        return self._current().states(instance)
+
+    def spoiled(self) -> frozenset[str]:
+        """Instances to which something irreversible has happened."""
+        return self._current().spoiled()
+
+    def events(self) -> tuple[Event, ...]:
+        """Everything that has happened since reset, in order."""
+        return self._current().events()
+
+
+class KitchenEnvironment:
+    """One household scene in which a robot looks and acts.
+
+    Args:
+        needs: what the scene must contain.
+        vocabulary: categories and rules.
+        renderer: "auto", or the name of one renderer of the embedded household.
+        intrinsics: of the head camera; 640×480 with 60° of vertical view by default.
+        times: duration of each skill.
+        effect_config: numbers of the automatic effects.
+        build: makes the world of a seed; the embedded MuJoCo kitchen by default.
+        make: makes the renderer of a world; by `renderer` name by default.
+    """
+
+    def __init__(
+        self,
+        needs: SceneNeeds,
+        vocabulary: Vocabulary,
+        renderer: str = "auto",
+        intrinsics: Intrinsics | None = None,
+        *,
+        times: SkillTimes | None = None,
+        effect_config: effects.EffectConfig | None = None,
+        build: Build | None = None,
+        make: MakeRenderer | None = None,
+    ) -> None:
+        self._needs = needs
+        self._vocabulary = vocabulary
+        self._intrinsics = intrinsics or Intrinsics.from_vertical_fov(
+            FRAME_WIDTH, FRAME_HEIGHT, VERTICAL_FOV_DEG
+        )
+        self._times = times or SkillTimes()
+        self._effect_config = effect_config or effects.EffectConfig()
+        self._build = build or _build_kitchen
+        self._make = make or _maker(renderer)
+        self._seed: int | None = None
+        self._world: Stage | None = None
+        self._renderer: Renderer | None = None
+        self._robot: Robot | None = None
+        self.oracle = KitchenOracle(lambda: self._acting.household)
+
+    def reset(self, seed: int) -> None:
+        """Build the scene of this seed, or put it back to its start if it stands already.
+
+        Raises:
+            SceneError: the scene cannot be built as asked.
+        """
+        if self._world is None or seed != self._seed:
+            self._renderer = None
+            self._world = self._build(self._needs, seed, self._vocabulary)
+            self._seed = seed
+        else:
+            self._world.reset()
+        household = Household(self._vocabulary, self._world, self._world.instances)
+        self._robot = Robot(household, self._times)
+        effects.settle(household, self._effect_config)
+
+    def scan(self) -> Observation:
+        """A full turn on the spot, with the time that turning takes."""
+        world = self._stage
+        step = 2 * math.pi / SCAN_FRAMES
+        poses = [world.camera_to_world(k * step, SCAN_TILT_RAD) for k in range(SCAN_FRAMES)]
+        self._acting.household.time_s += 4 * self._times.turn_s_per_90deg
+        return self._observation(poses)
+
+    def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
+        """One frame towards each world point, straight ahead and slightly down without any."""
+        world = self._stage
+        poses = [world.look_at(point) for point in focus]
+        return self._observation(poses or [world.camera_to_world(0.0, AHEAD_TILT_RAD)])
+
+    def execute(self, subtask: Subtask) -> SkillOutcome:
+        """Run one skill, then let the automatic effects settle."""
+        outcome = perform(self._acting, subtask)
+        effects.settle(self._acting.household, self._effect_config)
+        return outcome
+
+    def drop_held(self, hard: bool = False) -> str | None:
+        """Let go of the held object where the robot is; its name, None for an empty hand.
+
+        What falls stays intact, an egg apart, unless the fall is hard.
+        """
+        household = self._acting.household
+        held = household.held
+        if held is None:
+            return None
+        household.fall(held)
+        effects.crash(household, held, hard)
+        effects.settle(household, self._effect_config)
+        return held
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since reset."""
+        return self._acting.household.time_s
+
+    def close(self) -> None:
+        """Free the scene and the renderer; a later reset builds them again."""
+        self._world = self._renderer = self._robot = self._seed = None
+
+    @property
+    def _acting(self) -> Robot:
+        if self._robot is None:
+            raise ForestallError("the kitchen has no scene yet: call reset(seed) first")
+        return self._robot
+
+    @property
+    def _stage(self) -> Stage:
+        if self._world is None:
+            raise ForestallError("the kitchen has no scene yet: call reset(seed) first")
+        return self._world
+
+    def _observation(self, poses: Sequence[npt.NDArray[np.float64]]) -> Observation:
+        world, household = self._stage, self._acting.household
+        if self._renderer is None:
+            self._renderer = self._make(world, self._intrinsics)
+        frames: list[Frame] = [self._renderer.render(world.data, pose) for pose in poses]
+        return Observation(
+            frames=tuple(frames),
+            gripper=GripperState(household.held, world.gripper_position_world_m),
+            time_s=household.time_s,
+            robot_position_world_m=world.robot_position_world_m,
+        )
+
+
+def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stage:
+    from forestall.envs.kitchen.world import build_scene
+
+    return build_scene(needs, seed, vocabulary)
+
+
+def _maker(renderer: str) -> MakeRenderer:
+    def make(world: Any, intrinsics: Intrinsics) -> Renderer:
+        from forestall.envs.kitchen.rendering import make_renderer
+
+        return make_renderer(renderer, world.model, world.appearance, intrinsics)
+
+    return make
+
+
+__all__ = ["KitchenEnvironment", "KitchenOracle", "SkillStatus", "Stage"]

@@ -1,0 +1,10 @@
+"""Renderers of the embedded household: RGB, metric z-depth and instance ids.
+
+`make_renderer` is all that others need. Two ray casters (`embree`, `rays`) share one picture
+(`picture` → `lighting`, `shading`, `textures`); `gl` wraps MuJoCo's own renderer.
+"""
+
+from forestall.envs.kitchen.rendering.appearance import TEXTURES, Appearance
+from forestall.envs.kitchen.rendering.factory import RENDERERS, make_renderer
+
+__all__ = ["RENDERERS", "TEXTURES", "Appearance", "make_renderer"]

@@ -1,0 +1,61 @@
+"""Chooses a renderer by name."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import mujoco
+
+from forestall.envs.kitchen.rendering.appearance import Appearance
+from forestall.errors import InputError, UnknownNameError
+from forestall.interfaces import Renderer
+from forestall.types.observation import Intrinsics
+
+RENDERERS = ("auto", "embree", "gl", "rays")
+
+
+def make_renderer(
+    name: str, model: mujoco.MjModel, appearance: Appearance, intrinsics: Intrinsics
+) -> Renderer:
+    """A renderer for one compiled model.
+
+    Args:
+        name: "embree"; "rays" (MuJoCo's own rays, where embreex has no wheel); "gl" (needs a
+            system graphics library); "auto" is embree where embreex can be imported, else rays.
+        model: compiled model.
+        appearance: instances and textures of its geoms.
+        intrinsics: camera of every frame.
+
+    Raises:
+        UnknownNameError: no renderer has that name.
+        InputError: the renderer does not work on this machine; says what to install.
+    """
+    if name not in RENDERERS:
+        raise UnknownNameError("renderer", name, RENDERERS)
+    if name == "gl":
+        from forestall.envs.kitchen.rendering.gl import GlRenderer
+
+        return GlRenderer(model, appearance, intrinsics)
+    from forestall.envs.kitchen.rendering.picture import RayRenderer
+
+    if name == "rays" or (name == "auto" and not _embree_imports()):
+        from forestall.envs.kitchen.rendering.rays import MujocoTracer
+
+        return RayRenderer(MujocoTracer(model), model, appearance, intrinsics)
+    try:
+        from forestall.envs.kitchen.rendering.embree import EmbreeTracer
+    except ImportError as error:
+        raise InputError(
+            f"embreex cannot be imported ({error}): pip install embreex, or use the renderer 'rays'"
+        ) from error
+    return RayRenderer(EmbreeTracer(model), model, appearance, intrinsics)
+
+
+def _embree_imports() -> bool:
+    if importlib.util.find_spec("embreex") is None:
+        return False
+    try:
+        importlib.import_module("embreex.rtcore_scene")
+    except ImportError:
+        return False
+    return True

@@ -1,0 +1,216 @@
+"""Colour of surface points: material, texture, light, reflection, tone.
+
+Works on flat arrays of points, whatever traced them; called by `picture`.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from forestall.envs.kitchen.rendering.appearance import TEXTURES, Appearance
+from forestall.envs.kitchen.rendering.lighting import Light, Lights
+from forestall.envs.kitchen.rendering.textures import texture
+from forestall.envs.kitchen.rendering.tracer import Float, Hits, Int
+
+_SHINE: dict[str | None, tuple[float, float, float]] = {
+    # highlight, exponent, mirror-like reflection of the room
+    "metal": (0.55, 40.0, 0.45),
+    "ceramic": (0.35, 70.0, 0.05),
+    "tiles": (0.12, 40.0, 0.03),
+    "stone": (0.18, 50.0, 0.04),
+    "wood": (0.08, 20.0, 0.0),
+    "food": (0.10, 16.0, 0.0),
+    None: (0.05, 20.0, 0.0),
+}
+_BACKGROUND = (0.55, 0.62, 0.70)
+_GLOW = 2.2
+_GAMMA_STEPS = 1 << 14
+
+
+class Surfaces:
+    """What every geom looks like now; the colours are read anew at each `refresh`."""
+
+    def __init__(self, model: mujoco.MjModel, appearance: Appearance) -> None:
+        self._model = model
+        names = [model.geom(g).name for g in range(model.ngeom)]
+        no_material = np.asarray(model.geom_matid) < 0
+        self._glows = np.array([n.endswith("_glow") for n in names], dtype=bool) & no_material
+        self.kind = np.array(
+            [-1 if t is None else TEXTURES.index(t) for t in appearance.texture], dtype=np.int32
+        )
+        shine = [_SHINE.get(t, _SHINE[None]) for t in appearance.texture]
+        self.shine: Float = np.array(shine, dtype=np.float32).reshape(-1, 3)
+        for kind in np.unique(self.kind[self.kind >= 0]):
+            texture(TEXTURES[kind])
+        self.albedo: Float = np.zeros((model.ngeom, 3), np.float32)
+        self.alpha: Float = np.ones(model.ngeom, np.float32)
+        self.emission: Float = np.zeros(model.ngeom, np.float32)
+        self.position: Float = np.zeros((model.ngeom, 3), np.float32)
+        self.rotation: Float = np.zeros((model.ngeom, 3, 3), np.float32)
+        self.axes: Int = np.zeros((model.ngeom, 3), np.int32)
+
+    def refresh(self, data: mujoco.MjData) -> None:
+        """Read colours, sizes and poses."""
+        model = self._model
+        rgba = np.asarray(model.geom_rgba, np.float32).copy()
+        emission = np.where(self._glows, np.float32(1.0), np.float32(0.0))
+        owner = np.flatnonzero(model.geom_matid >= 0)
+        if owner.size:
+            material = model.geom_matid[owner]
+            rgba[owner] = model.mat_rgba[material]
+            emission[owner] = model.mat_emission[material]
+        self.albedo = np.clip(rgba[:, :3], 0, 1) ** np.float32(2.2)
+        self.alpha = rgba[:, 3]
+        self.emission = emission.astype(np.float32)
+        self.position = np.asarray(data.geom_xpos, np.float32)
+        self.rotation = np.asarray(data.geom_xmat, np.float32).reshape(-1, 3, 3)
+        half = np.asarray(model.geom_aabb[:, 3:])
+        self.axes = np.argsort(-half, axis=1, kind="stable").astype(np.int32)
+
+
+def shade(
+    surfaces: Surfaces,
+    lights: Lights,
+    hits: Hits,
+    points_world_m: Float,
+    directions: Float,
+    reach: Float,
+    pixel_m: float,
+) -> Float:
+    """Linear colours in [0, 1] of hits; the background where nothing was hit.
+
+    Args:
+        surfaces: materials of the geoms.
+        lights: the lights.
+        hits: what n rays met.
+        points_world_m: (n, 3) where.
+        directions: (n, 3) rays of unit z in the camera frame.
+        reach: (n, 2) visibility of the key light and of the ambient.
+        pixel_m: width of a pixel at 1 m.
+    """
+    geom, normal = hits.geom, hits.normal
+    albedo = surfaces.albedo[geom]
+    _texture_in_place(surfaces, hits, points_world_m, pixel_m, albedo)
+    up = (0.5 + 0.5 * normal[:, 2:3]) * reach[:, 1:2]
+    light = lights.ground * reach[:, 1:2] + (lights.sky - lights.ground) * up
+    towards, strength = _arriving(lights.key, points_world_m, normal)
+    light += lights.key.colour * (strength * reach[:, 0])[:, None]
+    for lamp in lights.fill:
+        _, more = _arriving(lamp, points_world_m, normal)
+        light += lamp.colour * (more * (0.35 + 0.65 * reach[:, 1]))[:, None]
+    colour = albedo * light
+    shiny = np.flatnonzero(surfaces.shine[geom, 0] > 0.06)
+    if shiny.size:
+        view = -directions[shiny]
+        view /= np.sqrt(np.einsum("ij,ij->i", view, view))[:, None]
+        colour[shiny] += _gloss(
+            surfaces.shine[geom[shiny]], lights, normal[shiny], view,
+            towards[shiny], reach[shiny], albedo[shiny], geom[shiny], surfaces.kind,
+        )  # fmt: skip
+    emission = surfaces.emission[geom]
+    if emission.any():
+        colour += albedo * (_GLOW * emission)[:, None]
+        colour += (0.12 * emission)[:, None]
+    colour = soft_clip(colour)
+    colour[geom < 0] = np.array(_BACKGROUND, np.float32)
+    return colour
+
+
+def _arriving(light: Light, points: Float, normal: Float) -> tuple[Float, Float]:
+    """Unit directions to the light and the cosine-weighted strength that arrives."""
+    if light.directional:
+        towards = np.broadcast_to(-light.direction, points.shape)
+        cosine = np.einsum("ij,ij->i", normal, towards)
+        return towards, np.maximum(cosine, 0).astype(np.float32)
+    towards = light.position_world_m - points
+    distance = np.sqrt(np.einsum("ij,ij->i", towards, towards))
+    towards = towards / np.maximum(distance, 1e-6)[:, None]
+    strength = np.maximum(np.einsum("ij,ij->i", normal, towards), 0)
+    c, linear, square = light.attenuation
+    if linear or square or c != 1.0:
+        strength = strength / np.maximum(c + distance * (linear + square * distance), 1e-3)
+    if light.cone_cosine > -1:
+        along = -(towards @ light.direction)
+        strength = strength * np.clip((along - light.cone_cosine + 0.1) / 0.25, 0, 1)
+    return towards, strength.astype(np.float32)
+
+
+def _gloss(
+    shine: Float,
+    lights: Lights,
+    normal: Float,
+    view: Float,
+    towards: Float,
+    reach: Float,
+    albedo: Float,
+    geom: Int,
+    kind: Int,
+) -> Float:
+    """Highlight of the key light and a blurred reflection of a bright ceiling and dark floor."""
+    half = view + towards
+    half /= np.sqrt(np.einsum("ij,ij->i", half, half))[:, None] + 1e-6
+    peak = np.maximum(np.einsum("ij,ij->i", half, normal), 0) ** shine[:, 1]
+    cosine = np.maximum(np.einsum("ij,ij->i", view, normal), 0)
+    fresnel = 0.04 + 0.96 * (1 - cosine) ** 5
+    rising = 2 * cosine * normal[:, 2] - view[:, 2]
+    room = 0.18 + 0.75 * np.clip(0.45 + 0.75 * rising, 0, 1) ** 2
+    metal = kind[geom] == TEXTURES.index("metal")
+    mirror = np.where(metal, shine[:, 2], shine[:, 2] + 0.5 * fresnel * (shine[:, 2] > 0))
+    tint = np.where(metal[:, None], albedo, np.float32(1.0))
+    glint = (shine[:, 0] * peak * reach[:, 0])[:, None] * lights.key.colour
+    glow = (mirror * room * (0.3 + 0.7 * reach[:, 1]))[:, None]
+    return np.asarray(glint * (0.4 + 0.6 * tint) + glow * tint, dtype=np.float32)
+
+
+def _texture_in_place(
+    surfaces: Surfaces, hits: Hits, points: Float, pixel_m: float, albedo: Float
+) -> None:
+    kinds = surfaces.kind[hits.geom]
+    kinds[hits.geom < 0] = -1
+    textured = np.flatnonzero(kinds >= 0)
+    if not textured.size:
+        return
+    geom = hits.geom[textured]
+    rotation = surfaces.rotation[geom]
+    local = np.einsum("nij,ni->nj", rotation, points[textured] - surfaces.position[geom])
+    across = np.abs(np.einsum("nij,ni->nj", rotation, hits.normal[textured]))
+    uv = face_coordinates(local, across, surfaces.axes[geom])
+    uv += ((geom * 37 % 64)[:, None] * np.array([0.113, 0.071])).astype(np.float32)
+    footprint = hits.distance[textured] * np.float32(pixel_m)
+    kinds = kinds[textured]
+    for kind in np.unique(kinds):
+        some = np.flatnonzero(kinds == kind)
+        albedo[textured[some]] *= texture(TEXTURES[kind]).sample(uv[some], footprint[some])
+
+
+def face_coordinates(local_m: Float, across: Float, axes: Int) -> Float:
+    """Coordinates (n, 2) in the face that each point lies on, the geom's longer axis first.
+
+    Args:
+        local_m: (n, 3) points in the geom's frame.
+        across: (n, 3) absolute components of the normal there.
+        axes: (n, 3) the geom's axes by falling extent.
+    """
+    row = np.arange(len(local_m))
+    normal_axis = across.argmax(axis=1)
+    first = np.where(axes[:, 0] == normal_axis, axes[:, 1], axes[:, 0])
+    second = 3 - normal_axis - first
+    return np.stack([local_m[row, first], local_m[row, second]], axis=1)
+
+
+def soft_clip(colour: Float) -> Float:
+    """Compresses what is brighter than 0.6 so that nothing burns out."""
+    knee = np.float32(0.6)
+    over = np.maximum(colour - knee, 0)
+    room = 1 - knee
+    return np.asarray(np.minimum(colour, knee) + room * (over / (over + room)), dtype=np.float32)
+
+
+_TO_DISPLAY = np.round(255 * np.linspace(0, 1, _GAMMA_STEPS) ** (1 / 2.2)).astype(np.uint8)
+
+
+def to_display(colour: Float) -> npt.NDArray[np.uint8]:
+    """Linear [0, 1] to 8-bit with gamma 2.2."""
+    return _TO_DISPLAY[(np.clip(colour, 0, 1) * (_GAMMA_STEPS - 1) + 0.5).astype(np.int32)]

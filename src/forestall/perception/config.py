@@ -1,0 +1,120 @@
+"""Every number of the perception, frozen and with its source. Read by all files of this package.
+
+REFLECT's spatial heuristics (Liu et al. 2023, its public `scene_graph.py`) are the starting point,
+as in the paper (Sec. 3 "3D Scene Graph Construction"): contact 0.1 m, close 0.4 m, inside 0.5, on
+top 0.7, direction cosines 0.9 / 0.8 / 0.9, occlusion 0.5. Where REFLECT compares whole clouds
+with boxes, the rules here ask for nearer evidence, and so the numbers are tighter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionConfig:
+    """Thresholds of perception; metres, pixels, shares in [0, 1].
+
+    Args:
+        min_pixels: masks under this are ignored (REFLECT drops tiny detections likewise).
+        max_points: pixels of one mask that are unprojected; larger masks are thinned on a lattice.
+        voxel_m: edge of the thinning grid for movable things.
+        fixture_voxel_m: the same for furniture, which is large.
+        min_cell_support: pixels in a 4-voxel cell and its six neighbours below which the cell is
+            an outlier (flying pixels at depth edges).
+        box_percentile: share of points cut off at each end of a box.
+        contact_above_m: how far a support's surface may lie above the lowest point that rests on
+            it (dents, rims).
+        contact_below_m: how far it may lie below (the lowest part is often hidden). Under
+            REFLECT's 0.1 m because supports are tested beneath the object only.
+        ring_m: how far around an object's footprint its support's surface is looked for, since
+            the object hides what is right below it.
+        min_contacts: support points that must be found there.
+        inside_share: share of points within the container's footprint (REFLECT: 0.5).
+        on_top_share: share of points above the support's footprint (REFLECT: 0.7).
+        covered_share: share of a small support that lies under an object (a burner under a pot).
+        footprint_slack_m: tolerance of footprints.
+        sectors: directions in which walls are looked for around something contained.
+        enclosed_sectors: how many of them must have a wall.
+        wall_reach_m: height band around an object in which a wall counts.
+        rim_slack_m: how far above an open rim the lowest visible point may lie.
+        close_m: gap under which direction relations are stated (REFLECT: CLOSE_DISTANCE).
+        near_m: gap under which two things are near (REFLECT: IN_CONTACT_DISTANCE).
+        vertical_cosine: direction cosine for above and below (REFLECT: 0.9).
+        lateral_cosine: for left and right (REFLECT: 0.8).
+        frontal_cosine: for in front of and behind (REFLECT: 0.9).
+        corridor_m: how far in front of a thing another one stands in the way.
+        corridor_half_width_m: least half width of the approach corridor (a hand's).
+        corridor_share: share of the corridor's width that must be cut.
+        min_obstacle_m: how far an obstacle must rise above the target's foot.
+        occlusion_share: share of a mask's outline that the nearer mask cuts off (REFLECT asks for
+            an image overlap of 0.5 of whole boxes; an outline is evidence of real occlusion).
+        depth_edge_m: step of depth at such an outline.
+        free_margin_m: how much farther than a remembered point the depth must be to be called
+            free space.
+        free_margin_share: the same as a share of the distance (depth noise grows with it).
+        gone_share: share of remembered points seen to be free or something else's, above which
+            the object has gone.
+        expected_pixels: expected size in the image, as a multiple of `min_pixels`, above which a
+            missing detection means something.
+        interior_share: share of a container's depth samples that must be seen for its inside to
+            count as observed.
+        same_place_m: distance over which an untracked detection is the same object as before.
+    """
+
+    min_pixels: int = 20
+    max_points: int = 4000
+    voxel_m: float = 0.008
+    fixture_voxel_m: float = 0.02
+    min_cell_support: int = 4
+    box_percentile: float = 0.01
+    contact_above_m: float = 0.015
+    contact_below_m: float = 0.035
+    ring_m: float = 0.04
+    min_contacts: int = 3
+    inside_share: float = 0.5
+    on_top_share: float = 0.7
+    covered_share: float = 0.5
+    footprint_slack_m: float = 0.01
+    sectors: int = 8
+    enclosed_sectors: int = 5
+    wall_reach_m: float = 0.06
+    rim_slack_m: float = 0.02
+    close_m: float = 0.4
+    near_m: float = 0.1
+    vertical_cosine: float = 0.9
+    lateral_cosine: float = 0.8
+    frontal_cosine: float = 0.9
+    corridor_m: float = 0.25
+    corridor_half_width_m: float = 0.05
+    corridor_share: float = 0.35
+    min_obstacle_m: float = 0.04
+    occlusion_share: float = 0.12
+    depth_edge_m: float = 0.03
+    free_margin_m: float = 0.02
+    free_margin_share: float = 0.01
+    gone_share: float = 0.5
+    expected_pixels: float = 4.0
+    interior_share: float = 0.3
+    same_place_m: float = 0.3
+
+
+SEMANTIC = ("blocking", "held_by", "inside", "on_top_of")
+"""Relations that say what a thing is doing, not merely where it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScopeConfig:
+    """What a graph for one subtask keeps.
+
+    Args:
+        whole: keep every node and relation (the subtask node is still set).
+        predicates: relations that are kept.
+        crowded: receptacles with many contents, of which only arguments are kept.
+        fellows: keep what stands beside an argument in the same small receptacle.
+    """
+
+    whole: bool = False
+    predicates: tuple[str, ...] = SEMANTIC
+    crowded: tuple[str, ...] = ("Cabinet", "Drawer", "Fridge", "GarbageCan", "Sink")
+    fellows: bool = True

@@ -1,0 +1,366 @@
+"""One scene over time: the newest view wins, what ought to be visible and is not has gone.
+
+What could not have been seen is kept and said to be remembered or unobserved. The robot's own
+sense of its hand decides what is held. Called by `perceiver.py`; calls `tracks.py` for what views
+say about remembered places, and `support.py`, `relations.py`, `blocking.py` for relations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from forestall.perception.blocking import blocking, cuts
+from forestall.perception.config import PerceptionConfig
+from forestall.perception.geometry import Stack, Thing
+from forestall.perception.relations import directions
+from forestall.perception.support import Parent, parents
+from forestall.perception.tracks import (
+    Fate,
+    Fates,
+    Track,
+    View,
+    expected_pixels,
+    fates,
+    interior_observed,
+)
+from forestall.perception.unproject import Points, robust_box
+from forestall.types.facts import GRIPPER, category_of
+from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
+from forestall.types.observation import Observation, Vec3
+from forestall.vocabulary import Category, Vocabulary
+
+_STILL_M = 0.03
+_MOST_POINTS = 6000
+
+
+class SceneMemory:
+    """Everything believed about the scene; `integrate` changes it, `graph` states it."""
+
+    def __init__(self, vocabulary: Vocabulary, config: PerceptionConfig) -> None:
+        self._vocabulary = vocabulary
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.tracks: dict[str, Track] = {}
+        self._held: str | None = None
+        self._hand_m: Vec3 = (0.0, 0.0, 0.0)
+        self._relations: list[Relation] = []
+
+    # --- integration ----------------------------------------------------------------------------
+
+    def integrate(self, observation: Observation, views: Sequence[View]) -> None:
+        """Take in one observation: all its views show the world at one time."""
+        before = [self.tracks[i] for i in sorted(self.tracks)]
+        fate = fates(before, views, self._config)
+        former, self._held = self._held, observation.gripper.holding
+        self._hand_m = observation.gripper.position_world_m
+        places = {t.id: _middle(t) for t in before if t.points_world_m is not None}
+        seen = self._take_in(views, fate, observation.time_s)
+        if self._held is not None:
+            self._hold(self._held, seen)
+        moved = self._carry(places, seen)
+        if former is not None and former != self._held and former not in seen:
+            self._drop_from_memory(former, seen)
+        self._forget_gone(fate, seen, moved, views)
+        self._replace_cut(seen, fate, former, observation.time_s)
+        self._relate(seen, views)
+        self._mark(seen, fate, views)
+
+    def _take_in(
+        self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float
+    ) -> set[str]:
+        """Update what is in view; returns its ids."""
+        shown: dict[str, list[tuple[View, int]]] = {}
+        for view in views:
+            for label, name in enumerate(view.ids):
+                if view.clouds[label] is not None:
+                    shown.setdefault(name, []).append((view, label))
+        for name in sorted(shown):
+            sightings = shown[name]
+            newest, label = sightings[-1]
+            track = self.tracks.get(name)
+            if track is None:
+                track = Track(name, newest.categories[label], first_seen_s=time_s)
+                self.tracks[name] = track
+            clouds = [c for view, at in sightings if (c := view.clouds[at]) is not None]
+            self._place(track, np.concatenate([c.points_world_m for c in clouds]), fate.get(name))
+            track.pixels = clouds[-1].pixels
+            track.last_seen_s = time_s
+            by_size = sorted(zip(clouds, sightings, strict=True), key=lambda s: s[0].pixels)
+            for _, (view, at) in by_size:
+                known = {a: v for a, v in view.states[at].items() if v is not None}
+                track.states.update(known)
+        return set(shown)
+
+    def _place(self, track: Track, fresh: Points, fate: Fates | None) -> None:
+        """Set a track's cloud from the newest views and what they leave standing of the old."""
+        old = track.points_world_m
+        fixture = self._is_fixture(track.category)
+        voxel = self._config.fixture_voxel_m if fixture else self._config.voxel_m
+        if old is not None and fate is not None:
+            kept = old[fate != Fate.GONE]
+            if fixture or self._unmoved(track, fresh, fate):
+                fresh = np.concatenate([fresh, kept])
+        track.points_world_m = _thinned(fresh, voxel)
+        track.low_m, track.high_m = robust_box(track.points_world_m, self._config.box_percentile)
+        track.centroid_m = track.points_world_m.mean(axis=0)
+
+    def _unmoved(self, track: Track, fresh: Points, fate: Fates) -> bool:
+        """Whether a new view of a movable thing only shows a part of what was there before."""
+        if track.id == self._held or float((fate == Fate.GONE).mean()) > 0.2:
+            return False
+        low, high = robust_box(fresh, self._config.box_percentile)
+        slack = 2 * self._config.voxel_m
+        return bool(np.all(low >= track.low_m - slack) and np.all(high <= track.high_m + slack))
+
+    def _hold(self, held: str, seen: set[str]) -> None:
+        track = self.tracks.get(held)
+        if track is None:
+            track = Track(held, category_of(self._vocabulary.canonical(held)))
+            self.tracks[held] = track
+        track.parent = None
+        if held not in seen:
+            hand = np.asarray(self._hand_m, dtype=np.float64)
+            if track.points_world_m is None:
+                track.points_world_m = hand[None, :]
+                track.low_m = track.high_m = track.centroid_m = hand
+            else:
+                track.move(hand - _middle(track))
+
+    def _carry(self, places: Mapping[str, Points], seen: set[str]) -> set[str]:
+        """Move what rests in or on something that moved; returns what was moved unseen."""
+        moved: set[str] = set()
+        pending = [
+            (name, _middle(t) - places[name])
+            for name, t in sorted(self.tracks.items())
+            if name in places
+            and t.points_world_m is not None
+            and (name in seen or name == self._held)
+            and not self._is_fixture(t.category)
+        ]
+        while pending:
+            name, offset = pending.pop()
+            if float(np.linalg.norm(offset)) < _STILL_M and name != self._held:
+                continue
+            for child in self._children(name):
+                if child.id not in seen and child.id not in moved:
+                    child.move(offset)
+                    moved.add(child.id)
+                    pending.append((child.id, offset))
+        return moved
+
+    def _children(self, name: str) -> list[Track]:
+        return [
+            t for _, t in sorted(self.tracks.items()) if t.parent is not None and t.parent[1] == name
+        ]
+
+    def _drop_from_memory(self, former: str, seen: set[str]) -> None:
+        """What is no longer held and not in view may be anywhere, with what is in it."""
+        self.tracks[former].lose()
+        for child in self._children(former):
+            if child.id not in seen:
+                child.points_world_m = None
+
+    def _forget_gone(
+        self,
+        fate: Mapping[str, Fates],
+        seen: set[str],
+        moved: set[str],
+        views: Sequence[View],
+    ) -> None:
+        enough = self._config.expected_pixels * self._config.min_pixels
+        for name, track in sorted(self.tracks.items()):
+            spared = name in seen or name in moved or name == self._held
+            if spared or name not in fate or self._is_fixture(track.category):
+                continue
+            if track.points_world_m is None or self._shut_in(track):
+                continue
+            share = float((fate[name] == Fate.GONE).mean())
+            if share >= self._config.gone_share and expected_pixels(track, views) >= enough:
+                track.lose()
+
+    def _replace_cut(
+        self, seen: set[str], fate: Mapping[str, Fates], former: str | None, time_s: float
+    ) -> None:
+        """Remove things that turned into other things (slices, a cracked egg) in view."""
+        fresh = [self.tracks[i] for i in sorted(seen) if self.tracks[i].first_seen_s == time_s]
+        for name in sorted(self.tracks):
+            track = self.tracks[name]
+            category = self._vocabulary.find(track.category)
+            if category is None or name in seen or name == self._held:
+                continue
+            becomes = {category.slices_into, category.cracks_into} - {None}
+            pieces = [t for t in fresh if t.category in becomes]
+            if not pieces:
+                continue
+            gone = track.points_world_m is None or bool(np.any(fate.get(name, 0) == Fate.GONE))
+            near = any(_gap_m(track, p) <= self._config.same_place_m for p in pieces)
+            if gone and (near or name == former or track.points_world_m is None):
+                self._remove(name)
+
+    def _remove(self, name: str) -> None:
+        del self.tracks[name]
+        for child in self.tracks.values():
+            if child.parent is not None and child.parent[1] == name:
+                child.parent = None
+
+    # --- relations and truth values -------------------------------------------------------------
+
+    def _relate(self, seen: set[str], views: Sequence[View]) -> None:
+        stack = Stack.of(
+            [
+                Thing(t.id, t.category, t.points_world_m, t.low_m, t.high_m, self._closed(t))
+                for t in self.tracks.values()
+                if t.points_world_m is not None
+            ]
+        )
+        subjects = seen - {self._held}
+        found = parents(stack, subjects, self._vocabulary, self._config)
+        for name in sorted(subjects):
+            track = self.tracks[name]
+            track.parent = found.get(name) or self._former_parent(track)
+        links = {n: t.parent for n, t in self.tracks.items() if t.parent is not None}
+        relations = [Relation(n, predicate, r) for n, (predicate, r) in links.items()]
+        if self._held is not None:
+            relations.append(Relation(self._held, "held_by", GRIPPER))
+        camera = views[-1].frame.camera_to_world
+        skip = {n for n, t in self.tracks.items() if self._is_large_support(t.category)}
+        skip |= {self._held} if self._held is not None else set()
+        tied = [(n, r) for n, (_, r) in links.items()]
+        relations += directions(stack, camera, skip, tied, self._config)
+        eye = (float(camera[0, 3]), float(camera[1, 3]), float(camera[2, 3]))
+        relations += blocking(stack, links, eye, self._cut_shares(views), self._config)
+        self._relations = relations
+
+    def _former_parent(self, track: Track) -> Parent | None:
+        """Keep a relation that the newest view cannot show again: what is on the held thing."""
+        if track.parent is None or track.parent[1] not in self.tracks:
+            return None
+        parent = self.tracks[track.parent[1]]
+        if parent.points_world_m is None:
+            return None
+        return track.parent if _gap_m(track, parent) <= self._config.ring_m else None
+
+    def _cut_shares(self, views: Sequence[View]) -> dict[tuple[str, str], float]:
+        shares: dict[tuple[str, str], float] = {}
+        for view in views:
+            count = len(view.ids)
+            cut = cuts(view.labels, view.frame.depth_m, count, self._config.depth_edge_m)
+            for b, a in np.argwhere(cut >= self._config.occlusion_share):
+                pair = (view.ids[b], view.ids[a])
+                shares[pair] = max(shares.get(pair, 0.0), float(cut[b, a]))
+        return shares
+
+    def _mark(self, seen: set[str], fate: Mapping[str, Fates], views: Sequence[View]) -> None:
+        for name, track in self.tracks.items():
+            if self._vocabulary.find(track.category) and self._vocabulary.encloses(track.category):
+                if self._closed(track):
+                    track.interior_seen = False
+                elif track.states.get("open") == "open" and name in seen:
+                    track.interior_seen |= interior_observed(track, views, self._config)
+        for name, track in self.tracks.items():
+            codes = fate.get(name)
+            if name in seen:
+                track.seen = Seen.VISIBLE
+            elif track.points_world_m is None or self._shut_in(track):
+                track.seen = Seen.UNOBSERVED
+            elif codes is not None and float((codes == Fate.OCCLUDED).mean()) > 0.5:
+                track.seen = Seen.UNOBSERVED
+            else:
+                track.seen = Seen.REMEMBERED
+            if name == self._held and name not in seen:
+                track.seen = Seen.REMEMBERED
+
+    def graph(self) -> SceneGraph:
+        """The scene as believed now."""
+        nodes = [self._node(t) for t in self.tracks.values()]
+        nodes.append(ObjectNode(GRIPPER, "Gripper", centroid_m=_vec(np.asarray(self._hand_m))))
+        hidden = [
+            n
+            for n, t in self.tracks.items()
+            if self._vocabulary.find(t.category) is not None
+            and self._vocabulary.encloses(t.category)
+            and not t.interior_seen
+        ]
+        return SceneGraph(tuple(nodes), tuple(self._relations), hidden=tuple(hidden))
+
+    def _node(self, track: Track) -> ObjectNode:
+        category = self._vocabulary.find(track.category)
+        attributes: tuple[str, ...] = () if category is None else category.attributes
+        states = {a: track.states.get(a) for a in attributes}
+        located = track.points_world_m is not None
+        return ObjectNode(
+            id=track.id,
+            category=track.category,
+            states=tuple(states.items()),
+            centroid_m=_vec(track.centroid_m) if located else None,
+            box_m=Box(_vec(track.low_m), _vec(track.high_m)) if located else None,
+            seen=track.seen,
+            pixels=track.pixels,
+            last_seen_s=track.last_seen_s,
+        )
+
+    # --- small questions ------------------------------------------------------------------------
+
+    def _category(self, name: str) -> Category | None:
+        return self._vocabulary.find(name)
+
+    def _is_fixture(self, category: str) -> bool:
+        found = self._vocabulary.find(category)
+        return found is not None and found.fixture
+
+    def _is_large_support(self, category: str) -> bool:
+        found = self._vocabulary.find(category)
+        if found is None or found.receptacle is None or not found.fixture:
+            return False
+        return found.receptacle.relation == "on_top_of" and found.receptacle.capacity is None
+
+    def _closed(self, track: Track) -> bool:
+        return (
+            track.states.get("open") == "closed"
+            and self._vocabulary.find(track.category) is not None
+            and self._vocabulary.encloses(track.category)
+        )
+
+    def _shut_in(self, track: Track) -> bool:
+        """Whether something closed is around it, at any depth."""
+        passed = {track.id}
+        while track.parent is not None and track.parent[1] in self.tracks:
+            track = self.tracks[track.parent[1]]
+            if track.id in passed:
+                return False
+            if self._closed(track):
+                return True
+            passed.add(track.id)
+        return False
+
+
+def _middle(track: Track) -> Points:
+    middle: Points = (track.low_m + track.high_m) / 2
+    return middle
+
+
+def _gap_m(one: Track, other: Track) -> float:
+    """Distance between two boxes."""
+    apart = np.maximum(one.low_m - other.high_m, other.low_m - one.high_m)
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
+
+
+def _thinned(points: Points, voxel_m: float) -> Points:
+    """One point for each voxel (the first, that is the newest), at most a fixed number."""
+    cell = np.floor(points / voxel_m).astype(np.int64) + (1 << 19)
+    key = (cell[:, 0] << 40) | (cell[:, 1] << 20) | cell[:, 2]
+    _, first = np.unique(key, return_index=True)
+    if len(first) > _MOST_POINTS:
+        first = first[np.linspace(0, len(first) - 1, _MOST_POINTS).astype(np.int64)]
+    thinned: Points = points[first]
+    return thinned
+
+
+def _vec(values: Points) -> Vec3:
+    x, y, z = (round(float(v), 4) for v in values)
+    return (x, y, z)

@@ -1,0 +1,102 @@
+"""Things as the relations see them: clouds, boxes and footprints, stacked into arrays.
+
+A footprint is the 16-gon around a cloud seen from above (its support values in 16 directions):
+nearly a convex hull, and tested for many points and many things with one comparison. Called by
+`support.py`, `relations.py` and `blocking.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.perception.unproject import Points
+
+_ANGLES = np.arange(16) * (2 * np.pi / 16)
+DIRECTIONS: Points = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+"""(2, 16) unit vectors of the footprint's sides."""
+
+_SAMPLES = 256
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """One located object.
+
+    Args:
+        id: node id.
+        category: of the vocabulary.
+        points_world_m: (n, 3), n ≥ 1.
+        low_m: (3,) lower corner of its box.
+        high_m: (3,) upper corner.
+        closed: it encloses its contents and is closed now.
+    """
+
+    id: str
+    category: str
+    points_world_m: Points
+    low_m: Points
+    high_m: Points
+    closed: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stack:
+    """Arrays over all things: boxes (n, 3), footprints (n, 16), clouds and samples of them."""
+
+    things: tuple[Thing, ...]
+    low_m: Points
+    high_m: Points
+    footprint_m: Points
+    cloud_m: Points
+    owner: npt.NDArray[np.int64]
+    samples: tuple[Points, ...]
+
+    @classmethod
+    def of(cls, things: Sequence[Thing]) -> Stack:
+        """Stack things in id order."""
+        ordered = tuple(sorted(things, key=lambda t: t.id))
+        if not ordered:
+            empty = np.zeros((0, 3))
+            return cls((), empty, empty, np.zeros((0, 16)), empty, np.zeros(0, np.int64), ())
+        counts = [len(t.points_world_m) for t in ordered]
+        cloud = np.concatenate([t.points_world_m for t in ordered])
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        reach = np.maximum.reduceat(cloud[:, :2] @ DIRECTIONS, starts, axis=0)
+        return cls(
+            things=ordered,
+            low_m=np.stack([t.low_m for t in ordered]),
+            high_m=np.stack([t.high_m for t in ordered]),
+            footprint_m=reach,
+            cloud_m=cloud,
+            owner=np.repeat(np.arange(len(ordered)), counts),
+            samples=tuple(sampled(t.points_world_m) for t in ordered),
+        )
+
+    def over(self, points_m: Points, slack_m: float) -> npt.NDArray[np.bool_]:
+        """(n, things) whether each point lies above or below each footprint."""
+        reach = points_m[:, :2] @ DIRECTIONS
+        within: npt.NDArray[np.bool_] = np.all(
+            reach[:, None, :] <= self.footprint_m[None, :, :] + slack_m, axis=2
+        )
+        return within
+
+    def gaps_m(self) -> Points:
+        """(things, things) distance between boxes, 0 where they touch."""
+        apart = np.maximum(
+            self.low_m[:, None, :] - self.high_m[None, :, :],
+            self.low_m[None, :, :] - self.high_m[:, None, :],
+        )
+        gap: Points = np.round(np.linalg.norm(np.maximum(apart, 0.0), axis=2), 6)
+        return gap
+
+
+def sampled(points_m: Points, most: int = _SAMPLES) -> Points:
+    """At most `most` points, evenly over the stored order."""
+    if len(points_m) <= most:
+        return points_m
+    picked: Points = points_m[np.linspace(0, len(points_m) - 1, most).astype(np.int64)]
+    return picked

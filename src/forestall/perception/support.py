@@ -1,0 +1,159 @@
+"""What each thing is inside or on top of: one parent, the smallest that holds it.
+
+The vocabulary says which of the two relations a receptacle offers and what it accepts; points say
+whether it holds. Support is a surface found right below and around an object (which hides what is
+under it), containment is walls found around it. Both use only what is visible of the receptacle.
+Called by `fuse.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.perception.config import PerceptionConfig
+from forestall.perception.geometry import DIRECTIONS, Stack
+from forestall.perception.unproject import Points
+from forestall.vocabulary import Vocabulary
+
+Parent = tuple[str, str]
+"""(predicate, id of the receptacle)."""
+
+
+def parents(
+    stack: Stack, subjects: Collection[str], vocabulary: Vocabulary, config: PerceptionConfig
+) -> dict[str, Parent]:
+    """For each subject that rests in or on something: the relation and the receptacle.
+
+    Args:
+        stack: every located thing.
+        subjects: ids whose parent is asked for.
+        vocabulary: which receptacle takes what, and how.
+        config: thresholds.
+    """
+    found: dict[str, Parent] = {}
+    for a, thing in enumerate(stack.things):
+        category = vocabulary.find(thing.category)
+        if thing.id not in subjects or (category is not None and category.fixture):
+            continue
+        parent = _parent(stack, a, vocabulary, config)
+        if parent is not None:
+            found[thing.id] = parent
+    return found
+
+
+def _parent(
+    stack: Stack, a: int, vocabulary: Vocabulary, config: PerceptionConfig
+) -> Parent | None:
+    near = _touching(stack, a, config)
+    candidates = [
+        r for r in near if _takes(vocabulary, stack.things[r].category, stack.things[a].category)
+    ]
+    if not candidates:
+        return None
+    own = stack.samples[a]
+    share = stack.over(own, config.footprint_slack_m).mean(axis=0)
+    contacts = _contacts(stack, a, vocabulary, config)
+    area = np.prod(stack.high_m[:, :2] - stack.low_m[:, :2], axis=1)
+    holding: list[tuple[float, str, int]] = []
+    touching: list[tuple[float, str, int]] = []
+    for r in candidates:
+        predicate = _relation(vocabulary, stack.things[r].category)
+        if predicate == "inside":
+            if _inside(stack, a, r, float(share[r]), vocabulary, config):
+                holding.append((float(area[r]), predicate, r))
+        elif contacts[r] >= config.min_contacts:
+            if share[r] >= config.on_top_share or _covers(stack, a, r, config):
+                holding.append((float(area[r]), predicate, r))
+            else:
+                touching.append((-float(contacts[r]), predicate, r))
+    if not holding and not touching:
+        return None
+    _, predicate, r = min(holding or touching)
+    return predicate, stack.things[r].id
+
+
+def _relation(vocabulary: Vocabulary, category: str) -> str:
+    receptacle = vocabulary[category].receptacle
+    return "" if receptacle is None else receptacle.relation
+
+
+def _takes(vocabulary: Vocabulary, receptacle: str, thing: str) -> bool:
+    known = vocabulary.find(receptacle) is not None and vocabulary.find(thing) is not None
+    return known and vocabulary.accepts(receptacle, thing)
+
+
+def _touching(stack: Stack, a: int, config: PerceptionConfig) -> list[int]:
+    """Things whose boxes come close to that of `a`."""
+    reach = np.array([config.ring_m, config.ring_m, 4 * config.contact_below_m])
+    close = np.all(
+        (stack.low_m <= stack.high_m[a] + reach) & (stack.high_m >= stack.low_m[a] - reach), axis=1
+    )
+    close[a] = False
+    return [int(r) for r in np.flatnonzero(close)]
+
+
+def _bottom_m(stack: Stack, a: int, vocabulary: Vocabulary) -> float:
+    """Height of the foot: the lowest visible point, or lower if the category is taller."""
+    size = vocabulary[stack.things[a].category].shape.get("size_m")
+    low, high = float(stack.low_m[a, 2]), float(stack.high_m[a, 2])
+    return low if size is None else min(low, high - float(size[2]))
+
+
+def _contacts(
+    stack: Stack, a: int, vocabulary: Vocabulary, config: PerceptionConfig
+) -> npt.NDArray[np.int64]:
+    """For each thing, how many of its points lie at the height of a's foot, below or around it."""
+    low, high = stack.low_m[a], stack.high_m[a]
+    p = stack.cloud_m
+    beside = np.all(
+        (p[:, :2] >= low[:2] - config.ring_m) & (p[:, :2] <= high[:2] + config.ring_m), axis=1
+    )
+    level = (p[:, 2] >= _bottom_m(stack, a, vocabulary) - config.contact_below_m) & (
+        p[:, 2] <= low[2] + config.contact_above_m
+    )
+    return np.bincount(stack.owner[beside & level], minlength=len(stack.things))
+
+
+def _covers(stack: Stack, a: int, r: int, config: PerceptionConfig) -> bool:
+    """Whether most of a small support lies under `a` (what shows of a burner under a pot)."""
+    reach = stack.samples[r][:, :2] @ DIRECTIONS
+    under = np.all(reach <= stack.footprint_m[a] + config.ring_m, axis=1)
+    return bool(under.mean() >= config.covered_share)
+
+
+def _inside(
+    stack: Stack,
+    a: int,
+    r: int,
+    share: float,
+    vocabulary: Vocabulary,
+    config: PerceptionConfig,
+) -> bool:
+    receptacle = stack.things[r]
+    if receptacle.closed or share < config.inside_share:
+        return False
+    z = stack.samples[a][:, 2]
+    floor, rim = float(stack.low_m[r, 2]), float(stack.high_m[r, 2])
+    if float(np.median(z)) < floor - config.rim_slack_m:
+        return False
+    if vocabulary.encloses(receptacle.category):
+        if float((z <= rim).mean()) < config.inside_share:
+            return False
+    elif float(stack.low_m[a, 2]) > rim + config.rim_slack_m:
+        return False
+    return _walls(stack, a, r, config) >= config.enclosed_sectors
+
+
+def _walls(stack: Stack, a: int, r: int, config: PerceptionConfig) -> int:
+    """In how many directions around `a`, at its height, points of `r` are found."""
+    centre = (stack.low_m[a, :2] + stack.high_m[a, :2]) / 2
+    p: Points = stack.things[r].points_world_m
+    level = (p[:, 2] >= stack.low_m[a, 2] - config.wall_reach_m) & (
+        p[:, 2] <= stack.high_m[a, 2] + config.wall_reach_m
+    )
+    offset = p[level][:, :2] - centre
+    turn = np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) * config.sectors
+    return len(np.unique(np.floor(turn).astype(np.int64) % config.sectors))

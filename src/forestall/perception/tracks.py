@@ -1,0 +1,146 @@
+"""What is remembered of each object, and what the newest views say about remembered places.
+
+Called by `fuse.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.perception.config import PerceptionConfig
+from forestall.perception.support import Parent
+from forestall.perception.unproject import Cloud, Labels, Points, project
+from forestall.types.graph import Seen
+from forestall.types.observation import Frame
+
+
+@dataclass(slots=True)
+class Track:
+    """One object as believed now; `points_world_m` is None when its place is not known."""
+
+    id: str
+    category: str
+    points_world_m: Points | None = None
+    low_m: Points = field(default_factory=lambda: np.zeros(3))
+    high_m: Points = field(default_factory=lambda: np.zeros(3))
+    centroid_m: Points = field(default_factory=lambda: np.zeros(3))
+    pixels: int = 0
+    seen: Seen = Seen.UNOBSERVED
+    first_seen_s: float = 0.0
+    last_seen_s: float = 0.0
+    states: dict[str, str | None] = field(default_factory=dict)
+    parent: Parent | None = None
+    interior_seen: bool = False
+
+    def move(self, offset_m: Points) -> None:
+        """Shift everything that is remembered of its place."""
+        if self.points_world_m is not None:
+            self.points_world_m = self.points_world_m + offset_m
+            self.low_m = self.low_m + offset_m
+            self.high_m = self.high_m + offset_m
+            self.centroid_m = self.centroid_m + offset_m
+
+    def lose(self) -> None:
+        """Forget where it is."""
+        self.points_world_m = None
+        self.parent = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One frame with what was found in it; `ids`, `clouds` and `states` by label."""
+
+    frame: Frame
+    labels: Labels
+    ids: tuple[str, ...]
+    categories: tuple[str, ...]
+    clouds: tuple[Cloud | None, ...]
+    states: tuple[Mapping[str, str | None], ...]
+
+
+class Fate(IntEnum):
+    """What a view says about a remembered point; of several views the largest counts."""
+
+    OUT_OF_VIEW = 0
+    OCCLUDED = 1
+    GONE = 2
+    CONFIRMED = 3
+
+
+Fates = npt.NDArray[np.int8]
+
+
+def fates(
+    tracks: Sequence[Track], views: Sequence[View], config: PerceptionConfig
+) -> dict[str, Fates]:
+    """For each located track, what became of its points (`Fate` values)."""
+    located = [t for t in tracks if t.points_world_m is not None]
+    clouds = [t.points_world_m for t in located if t.points_world_m is not None]
+    if not clouds:
+        return {}
+    cloud = np.concatenate(clouds)
+    sizes = [len(c) for c in clouds]
+    result: Fates = np.zeros(len(cloud), dtype=np.int8)
+    for view in views:
+        label_of = {name: i for i, name in enumerate(view.ids)}
+        own = np.repeat([label_of.get(t.id, -2) for t in located], sizes)
+        np.maximum(result, _fates_in(view, cloud, own, config), out=result)
+    ends = np.cumsum(sizes)
+    return {t.id: result[e - n : e] for t, n, e in zip(located, sizes, ends, strict=True)}
+
+
+def _fates_in(
+    view: View, cloud: Points, own: npt.NDArray[np.int64], config: PerceptionConfig
+) -> Fates:
+    u, v, z, inside = project(cloud, view.frame.intrinsics, view.frame.camera_to_world)
+    depth = view.frame.depth_m[v, u]
+    known = inside & (depth > 0)
+    margin = config.free_margin_m + config.free_margin_share * z
+    fate: Fates = np.full(len(cloud), Fate.OUT_OF_VIEW, dtype=np.int8)
+    fate[known & (depth < z - margin)] = Fate.OCCLUDED
+    reached = known & (depth >= z - margin)
+    fate[reached] = Fate.GONE
+    same = view.labels[v, u] == own
+    fate[reached & same & (depth <= z + margin)] = Fate.CONFIRMED
+    return fate
+
+
+def expected_pixels(track: Track, views: Sequence[View]) -> float:
+    """How large the remembered box would look in the view that shows it largest."""
+    if track.points_world_m is None:
+        return 0.0
+    best = 0.0
+    for view in views:
+        u, v, _, inside = project(
+            track.points_world_m, view.frame.intrinsics, view.frame.camera_to_world
+        )
+        if int(inside.sum()) > 1:
+            best = max(best, 0.5 * float(np.ptp(u[inside]) * np.ptp(v[inside])))
+    return best
+
+
+def interior_observed(track: Track, views: Sequence[View], config: PerceptionConfig) -> bool:
+    """Whether enough of the far part of a container's box was looked into.
+
+    The far part, because an open door makes the box larger on the near side.
+    """
+    if track.points_world_m is None:
+        return False
+    steps = np.linspace(0.2, 0.8, 5)
+    grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    samples = track.low_m + grid * (track.high_m - track.low_m)
+    for view in views:
+        eye = view.frame.camera_to_world[:3, 3]
+        distance = np.linalg.norm(samples[:, :2] - eye[:2], axis=1)
+        far = samples[distance >= np.quantile(distance, 0.4)]
+        u, v, z, inside = project(far, view.frame.intrinsics, view.frame.camera_to_world)
+        depth = view.frame.depth_m[v, u]
+        open_view = inside & (depth >= z - config.free_margin_m)
+        if float(open_view.mean()) >= config.interior_share:
+            return True
+    return False

@@ -1,0 +1,215 @@
+"""From masks and depth to one clean cloud per instance, in the world frame.
+
+All instances of a frame are reduced together: one integer key holds instance and voxel, one sort
+does the thinning, and outliers fall to a count of neighbours on a coarser grid (REFLECT voxelises
+and removes outliers one cloud at a time). Called by the perceiver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.perception.config import PerceptionConfig
+from forestall.types.observation import Detection, Frame, Intrinsics, Pose
+
+Points = npt.NDArray[np.float64]
+Labels = npt.NDArray[np.int16]
+
+_GRID_BITS = 14
+_GRID_HALF = 1 << (_GRID_BITS - 1)
+_COARSE = 2  # bits: a coarse cell is four voxels wide
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cloud:
+    """What one mask shows of an object.
+
+    `points_world_m` is (n, 3), sorted by voxel; `low_m`, `high_m` and `centroid_m` are (3,).
+    `pixels` counts the mask, `image_box` is (left, top, right, bottom), inclusive.
+    """
+
+    points_world_m: Points
+    low_m: Points
+    high_m: Points
+    centroid_m: Points
+    pixels: int
+    image_box: tuple[int, int, int, int]
+
+
+def label_image(detections: Sequence[Detection], shape: tuple[int, int]) -> Labels:
+    """(H, W) int16: index of the detection at each pixel, -1 for none.
+
+    Where masks overlap, the smaller one lies on top.
+    """
+    sizes = [int(np.count_nonzero(d.mask)) for d in detections]
+    keys = [d.instance or d.category for d in detections]
+    labels: Labels = np.full(shape, -1, dtype=np.int16)
+    for i in sorted(range(len(detections)), key=lambda i: (-sizes[i], keys[i])):
+        np.copyto(labels, np.int16(i), where=detections[i].mask)
+    return labels
+
+
+@lru_cache(maxsize=4)
+def _lattice(width: int, height: int) -> npt.NDArray[np.uint16]:
+    """u | v: its low k bits are zero on a lattice of stride 2^k."""
+    u = np.arange(width, dtype=np.uint16)
+    v = np.arange(height, dtype=np.uint16)
+    return (u[None, :] | v[:, None]).ravel()
+
+
+@lru_cache(maxsize=4)
+def _rays(k: Intrinsics) -> npt.NDArray[np.float32]:
+    """(H·W, 2) x and y of the ray through each pixel at z = 1."""
+    x = (np.arange(k.width, dtype=np.float32) - k.cx) / k.fx
+    y = (np.arange(k.height, dtype=np.float32) - k.cy) / k.fy
+    return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1).reshape(-1, 2)
+
+
+def project(
+    points_world_m: Points, intrinsics: Intrinsics, camera_to_world: Pose
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Points, npt.NDArray[np.bool_]]:
+    """Pixel columns, rows, z-depth and whether each point falls into the image."""
+    local = (points_world_m - camera_to_world[:3, 3]) @ camera_to_world[:3, :3]
+    z = local[:, 2]
+    ahead = z > 0.05
+    safe = np.where(ahead, z, 1.0)
+    u = np.rint(local[:, 0] / safe * intrinsics.fx + intrinsics.cx)
+    v = np.rint(local[:, 1] / safe * intrinsics.fy + intrinsics.cy)
+    inside = ahead & (u >= 0) & (u < intrinsics.width) & (v >= 0) & (v < intrinsics.height)
+    column = np.where(inside, u, 0).astype(np.int64)
+    row = np.where(inside, v, 0).astype(np.int64)
+    return column, row, z, inside
+
+
+def clouds(
+    frame: Frame, labels: Labels, voxel_m: Sequence[float], config: PerceptionConfig
+) -> list[Cloud | None]:
+    """One cloud for each detection (None where no depth returned under its mask).
+
+    Args:
+        frame: depth and camera.
+        labels: (H, W) index of the detection at each pixel, -1 for none.
+        voxel_m: edge of the thinning grid for each detection.
+        config: thresholds.
+    """
+    count = len(voxel_m)
+    flat = labels.ravel()
+    pixels = np.bincount(flat + 1, minlength=count + 1)[1:]
+    boxes = _image_boxes(labels, count)
+    if count == 0:
+        return []
+    index, owner = _sampled_pixels(frame, flat, pixels, config.max_points)
+    points = _to_world(frame, index)
+    owner, points, weights = _thin(points, owner, np.asarray(voxel_m), config)
+    starts = np.searchsorted(owner, np.arange(count + 1))
+    result: list[Cloud | None] = []
+    for i in range(count):
+        own = points[starts[i] : starts[i + 1]]
+        if len(own) == 0:
+            result.append(None)
+            continue
+        low, high = robust_box(own, config.box_percentile)
+        centroid = np.average(own, axis=0, weights=weights[starts[i] : starts[i + 1]])
+        result.append(Cloud(own, low, high, centroid, int(pixels[i]), boxes[i]))
+    return result
+
+
+def robust_box(points_m: Points, share: float) -> tuple[Points, Points]:
+    """Lower and upper corner without the outermost share of points at each end of each axis."""
+    cut = int(len(points_m) * share)
+    if cut == 0:
+        return points_m.min(axis=0), points_m.max(axis=0)
+    ordered = np.partition(points_m, (cut, len(points_m) - 1 - cut), axis=0)
+    return ordered[cut], ordered[len(points_m) - 1 - cut]
+
+
+def _image_boxes(labels: Labels, count: int) -> list[tuple[int, int, int, int]]:
+    """Bounds of each label, from which columns and rows it occurs in."""
+    boxes = []
+    height, width = labels.shape
+    in_column = np.zeros((count + 1, width), dtype=bool)
+    in_row = np.zeros((count + 1, height), dtype=bool)
+    in_column[labels, np.arange(width)[None, :]] = True
+    in_row[labels, np.arange(height)[:, None]] = True
+    for i in range(count):
+        u, v = np.flatnonzero(in_column[i]), np.flatnonzero(in_row[i])
+        boxes.append(
+            (int(u[0]), int(v[0]), int(u[-1]), int(v[-1])) if len(u) and len(v) else (0, 0, -1, -1)
+        )
+    return boxes
+
+
+def _sampled_pixels(
+    frame: Frame, flat: Labels, pixels: npt.NDArray[np.int64], max_points: int
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Flat indices and labels of the pixels that are unprojected."""
+    stride = np.sqrt(np.maximum(pixels / max_points, 1.0))
+    low_bits = np.left_shift(1, np.ceil(np.log2(stride)).astype(np.int64)) - 1
+    table = np.append(low_bits, 0).astype(np.uint16)
+    lattice = _lattice(frame.intrinsics.width, frame.intrinsics.height)
+    keep = (lattice & table[flat]) == 0
+    keep &= flat >= 0
+    keep &= frame.depth_m.ravel() > 0
+    index = np.flatnonzero(keep)
+    return index, flat[index].astype(np.int64)
+
+
+def _to_world(frame: Frame, index: npt.NDArray[np.int64]) -> Points:
+    rays = _rays(frame.intrinsics)[index]
+    depth = frame.depth_m.ravel()[index]
+    local = np.empty((len(index), 3))
+    local[:, :2] = rays * depth[:, None]
+    local[:, 2] = depth
+    world: Points = local @ frame.camera_to_world[:3, :3].T + frame.camera_to_world[:3, 3]
+    return world
+
+
+def _thin(
+    points: Points,
+    owner: npt.NDArray[np.int64],
+    voxel_m: Points,
+    config: PerceptionConfig,
+) -> tuple[npt.NDArray[np.int64], Points, Points]:
+    """Voxel means, outliers removed: owner, point and pixel count of each voxel, by owner."""
+    cell = np.floor(points / voxel_m[owner][:, None]).astype(np.int64) + _GRID_HALF
+    np.clip(cell, 0, 2 * _GRID_HALF - 1, out=cell)
+    key = _key(owner, cell)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    starts = np.flatnonzero(np.diff(key, prepend=-1))
+    weights = np.diff(starts, append=len(key)).astype(np.float64)
+    if len(starts) == 0:
+        return owner, points, weights
+    means = np.add.reduceat(points[order], starts, axis=0) / weights[:, None]
+    first = order[starts]
+    keep = _supported(owner[first], cell[first] >> _COARSE, weights, config.min_cell_support)
+    return owner[first][keep], means[keep], weights[keep]
+
+
+def _key(owner: npt.NDArray[np.int64], cell: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    key = owner
+    for axis in range(3):
+        key = (key << _GRID_BITS) | cell[:, axis]
+    return key
+
+
+def _supported(
+    owner: npt.NDArray[np.int64], coarse: npt.NDArray[np.int64], weights: Points, least: int
+) -> npt.NDArray[np.bool_]:
+    """Whether a voxel's coarse cell with its six neighbours holds enough pixels."""
+    key = _key(owner, coarse)
+    cells, inverse = np.unique(key, return_inverse=True)
+    held = np.bincount(inverse, weights=weights)
+    total = held.copy()
+    for step in (1, 1 << _GRID_BITS, 1 << (2 * _GRID_BITS)):
+        at = np.searchsorted(cells, cells + step)
+        hit = np.flatnonzero((at < len(cells)) & (cells[np.minimum(at, len(cells) - 1)] - step == cells))
+        np.add.at(total, hit, held[at[hit]])
+        np.add.at(total, at[hit], held[hit])
+    enough: npt.NDArray[np.bool_] = (total >= least)[inverse]
+    return enough

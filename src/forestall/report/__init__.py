@@ -1,0 +1,1 @@
+"""Records, pages and progress: reads finished records and listens, changes nothing."""

@@ -1,0 +1,64 @@
+"""Pictures of a run: encoded for the record's folder, and small enough for a page.
+
+Only Pillow; the same picture gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+from dataclasses import dataclass
+
+from forestall.types.observation import Frame, Rgb
+
+_QUALITIES = (84, 72, 60, 45, 30, 18)
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture inside a page."""
+
+    uri: str  # data URI
+    width: int
+    height: int
+
+
+def encode_jpeg(rgb: Rgb, *, width: int | None = None, quality: int = 92) -> bytes:
+    """An (H, W, 3) uint8 picture as JPEG, scaled down to `width` pixels where it is wider."""
+    from PIL import Image
+
+    image = Image.fromarray(rgb)
+    if width is not None and image.width > width:
+        height = max(1, round(image.height * width / image.width))
+        image = image.resize((width, height), Image.Resampling.LANCZOS)
+    buffer = io.BytesIO()
+    image.save(buffer, "JPEG", quality=quality, optimize=True)
+    return buffer.getvalue()
+
+
+def file_name(data: bytes) -> str:
+    """A name made from the content, so that a picture is never mistaken for another."""
+    return f"{hashlib.sha256(data).hexdigest()[:16]}.jpg"
+
+
+def page_picture(frame: Frame, *, width: int, budget_bytes: int) -> Picture:
+    """A frame as data URI in the best quality that fits into `budget_bytes` characters.
+
+    Where even the lowest quality does not fit, the picture gets smaller.
+    """
+    while True:
+        for quality in _QUALITIES:
+            data = encode_jpeg(frame.rgb, width=width, quality=quality)
+            if len(data) * 4 / 3 <= budget_bytes:
+                return _picture(frame, data, width)
+        if width <= 64:
+            return _picture(frame, data, width)
+        width = width * 3 // 4
+
+
+def _picture(frame: Frame, data: bytes, width: int) -> Picture:
+    shown = min(width, frame.intrinsics.width)
+    height = max(1, round(frame.intrinsics.height * shown / frame.intrinsics.width))
+    uri = "data:image/jpeg;base64," + base64.b64encode(data).decode("ascii")
+    return Picture(uri, shown, height)

@@ -1,0 +1,287 @@
+"""The one episode loop: look, perceive, ask the strategy, act.
+
+It sees only L0; environment, perceiver, strategy and listeners come through the constructor. All
+strategies run in this loop, so that a measured difference between them is theirs. Listeners are
+told what happened and cannot change it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from forestall.grounding import executable, ground_subtask
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeEnd,
+    EpisodeRecord,
+    ExecutedRecord,
+    SkillStatus,
+)
+from forestall.types.facts import category_of, is_instance
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation, Vec3
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.task import Task
+from forestall.types.verdict import Decision
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from forestall.interfaces import Environment, Listener, Perceiver, Strategy
+    from forestall.vocabulary import Vocabulary
+
+Score = Callable[[EpisodeRecord], EpisodeRecord]
+
+
+@dataclass(frozen=True, slots=True)
+class RuntimeConfig:
+    """Bounds of one episode.
+
+    Args:
+        max_subtasks: how many subtasks may be executed.
+        max_replans: how many corrected plans may be adopted; afterwards the plan at hand goes on.
+        max_looks: how many observations one boundary may take.
+        keep_observations: whether pictures go into the record.
+    """
+
+    max_subtasks: int = 150
+    max_replans: int = 8
+    max_looks: int = 2
+    keep_observations: bool = True
+
+
+@dataclass(slots=True)
+class _Episode:
+    """What changes while one episode runs."""
+
+    task: Task
+    plan: Plan
+    graph: SceneGraph
+    observation: Observation
+    index: int = 0
+    replans: int = 0
+    bound: dict[str, str] = field(default_factory=dict)
+    boundaries: list[BoundaryRecord] = field(default_factory=list)
+    executed: list[ExecutedRecord] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        started = time.perf_counter()
+        yield
+        self.add(name, time.perf_counter() - started)
+
+    def add(self, name: str, seconds: float) -> None:
+        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
+
+
+class Runtime:
+    """Runs one task with one strategy."""
+
+    def __init__(
+        self,
+        environment: Environment,
+        perceiver: Perceiver,
+        strategy: Strategy,
+        vocabulary: Vocabulary,
+        listeners: Sequence[Listener] = (),
+        config: RuntimeConfig | None = None,
+    ) -> None:
+        self._environment = environment
+        self._perceiver = perceiver
+        self._strategy = strategy
+        self._vocabulary = vocabulary
+        self._listeners = tuple(listeners)
+        self._config = config or RuntimeConfig()
+
+    def run(
+        self,
+        task: Task,
+        plan: Plan,
+        seed: int,
+        scenario: str | None = None,
+        score: Score | None = None,
+        provenance: Sequence[tuple[str, Any]] = (),
+    ) -> EpisodeRecord:
+        """Run one episode to its end.
+
+        Args:
+            task: goal and names.
+            plan: the plan to start with (a scenario may have changed the nominal one).
+            seed: of the scene.
+            scenario: its name, for the record.
+            score: fills success and history after the run; it alone sees the truth.
+            provenance: configuration, versions and the like, for the record.
+        """
+        for listener in self._listeners:
+            listener.on_start(task, plan, seed)
+        self._environment.reset(seed)
+        self._perceiver.reset()
+        started = time.perf_counter()
+        observation = self._environment.scan()
+        looked = time.perf_counter()
+        graph = self._perceiver.perceive(observation)
+        episode = _Episode(task, plan, graph, observation)
+        episode.add("observe", looked - started)
+        episode.add("perceive", time.perf_counter() - looked)
+        end = self._loop(episode)
+        record = EpisodeRecord(
+            task=task,
+            scenario=scenario,
+            strategy=self._strategy.name,
+            seed=seed,
+            initial_plan=plan,
+            boundaries=tuple(episode.boundaries),
+            executed=tuple(episode.executed),
+            end=end,
+            simulated_s=self._environment.time_s,
+            compute_s=tuple(sorted(episode.seconds.items())),
+            provenance=(*provenance, ("perception", dict(self._perceiver.describe()))),
+        )
+        if score is not None:
+            record = score(record)
+        for listener in self._listeners:
+            listener.on_end(record)
+        return record
+
+    def _loop(self, episode: _Episode) -> EpisodeEnd:
+        while len(episode.executed) < self._config.max_subtasks:
+            if episode.index >= len(episode.plan):
+                last = episode.boundaries[-1] if episode.boundaries else None
+                context = self._context(episode, last.subtask if last else None, 1)
+                if context is None or not self._adopt(
+                    episode, self._strategy.after_episode(context)
+                ):
+                    return EpisodeEnd.PLAN_FINISHED
+                continue
+            context, answer = self._boundary(episode)
+            if answer.decision is Decision.STOP:
+                return EpisodeEnd.STOPPED
+            if self._adopt(episode, answer):
+                continue
+            self._execute(episode, context)
+        return EpisodeEnd.SUBTASK_LIMIT
+
+    def _boundary(self, episode: _Episode) -> tuple[BoundaryContext, StrategyAnswer]:
+        """Look towards what the next subtask concerns, perceive, and ask the strategy."""
+        before = dict(episode.seconds)
+        with episode.phase("observe"):
+            observation = self._environment.observe(self._focus(episode, self._ground(episode)))
+        looks = 1
+        while True:
+            with episode.phase("perceive"):
+                episode.graph = self._perceiver.perceive(observation)
+                episode.observation = observation
+                context = self._context(episode, self._ground(episode), looks)
+            assert context is not None
+            started = time.perf_counter()
+            answer = self._strategy.before_subtask(context)
+            spent = time.perf_counter() - started
+            for name, seconds in answer.seconds:
+                episode.add(name, seconds)
+            episode.add("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
+            if answer.decision is not Decision.LOOK_AGAIN or looks >= self._config.max_looks:
+                break
+            looks += 1
+            with episode.phase("observe"):
+                observation = self._environment.scan()
+        self._note(episode, context, answer, before)
+        return context, answer
+
+    def _note(
+        self,
+        episode: _Episode,
+        context: BoundaryContext,
+        answer: StrategyAnswer,
+        before: dict[str, float],
+    ) -> None:
+        spent = {k: v - before.get(k, 0.0) for k, v in episode.seconds.items()}
+        episode.boundaries.append(
+            BoundaryRecord(
+                index=len(episode.boundaries),
+                subtask=context.subtask,
+                graph=context.graph,
+                scoped=context.scoped,
+                observation=context.observation if self._config.keep_observations else None,
+                looks=context.looks,
+                verdict=answer.verdict,
+                diagnosis=answer.diagnosis,
+                replan=answer.replan,
+                seconds=tuple(sorted((k, v) for k, v in spent.items() if v > 0)),
+                time_s=self._environment.time_s,
+            )
+        )
+        for listener in self._listeners:
+            listener.on_boundary(context, answer)
+
+    def _execute(self, episode: _Episode, context: BoundaryContext) -> None:
+        planned = episode.plan.subtasks[episode.index]
+        command = executable(context.subtask, planned, self._vocabulary)
+        with episode.phase("act"):
+            outcome = self._environment.execute(command)
+        for name in context.subtask.args:
+            if is_instance(name):
+                episode.bound[category_of(name)] = name
+        boundary = len(episode.boundaries) - 1
+        episode.executed.append(ExecutedRecord(context.subtask, outcome, boundary))
+        for listener in self._listeners:
+            listener.on_executed(context.subtask, outcome, self._environment.time_s)
+        episode.index += 1
+        self._adopt(episode, self._strategy.after_subtask(context, outcome))
+        if outcome.status is SkillStatus.REFUSED:
+            episode.bound.clear()
+
+    def _adopt(self, episode: _Episode, answer: StrategyAnswer) -> bool:
+        if answer.decision is not Decision.REPLAN:
+            return False
+        if answer.replan is None or answer.replan.plan is None:
+            return False
+        if episode.replans >= self._config.max_replans:
+            return False
+        episode.plan = answer.replan.plan
+        episode.index = 0
+        episode.replans += 1
+        return True
+
+    def _ground(self, episode: _Episode) -> Subtask:
+        return ground_subtask(
+            episode.plan.subtasks[episode.index],
+            episode.graph,
+            self._vocabulary,
+            episode.observation.robot_position_world_m,
+            episode.bound,
+        )
+
+    def _focus(self, episode: _Episode, subtask: Subtask) -> tuple[Vec3, ...]:
+        """World points of the arguments that are somewhere else than in the hand."""
+        holding = episode.graph.holding
+        points = []
+        for name in subtask.args:
+            node = episode.graph.get(name)
+            if node is not None and node.centroid_m is not None and node.id != holding:
+                points.append(node.centroid_m)
+        return tuple(points)
+
+    def _context(
+        self, episode: _Episode, subtask: Subtask | None, looks: int
+    ) -> BoundaryContext | None:
+        if subtask is None:
+            return None
+        left = len(episode.plan) - episode.index
+        return BoundaryContext(
+            task=episode.task,
+            plan=episode.plan,
+            index=episode.index,
+            done=max(0, len(episode.task.plan) - left),
+            subtask=subtask,
+            graph=episode.graph,
+            scoped=self._perceiver.scope(episode.graph, subtask),
+            observation=episode.observation,
+            looks=looks,
+            replans=episode.replans,
+        )

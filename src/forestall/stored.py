@@ -1,0 +1,83 @@
+"""Judging a stored observation of the user's own (no simulator, nothing is executed).
+
+Calls: command line → here → build, perception. Composition like `build.py`, for `forestall check`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from forestall.benchmark.files import load_task
+from forestall.build import RunConfig, make_detector
+from forestall.comparison.preconditions import mine, violations
+from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.embeddings.hashed import HashedTextEncoder
+from forestall.grounding import ground_subtask
+from forestall.memory.retrieval import EmbeddingRetriever
+from forestall.perception.folder import read_observation
+from forestall.perception.oracle import GivenStateEstimator
+from forestall.perception.perceiver import GraphPerceiver
+from forestall.perception.segmenters import GivenMasks
+from forestall.types.demonstration import Demonstration
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext
+from forestall.types.scene import SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import Decision, Diagnosis, Verdict
+from forestall.vocabulary import household
+
+
+def judge_stored(
+    folder: Path,
+    subtask: str,
+    task: str | None,
+    demonstrations: Sequence[Demonstration],
+    threshold: float,
+) -> tuple[SceneGraph, Verdict, Diagnosis | None]:
+    """The scoped graph, the verdict, and on an alarm the diagnosis.
+
+    Args:
+        folder: the observation, see docs/observation-format.md.
+        subtask: in text form.
+        task: name or file of the task; its own demonstrations are preferred.
+        demonstrations: the memory.
+        threshold: of the detector.
+
+    Raises:
+        InputError: a name, the observation or the subtask is not valid.
+    """
+    loaded = None if task is None else load_task(task)
+    vocabulary = household() if loaded is None else loaded.vocabulary
+    wanted = Subtask.parse(subtask)
+    for name in wanted.args:
+        vocabulary[name]
+    observation, states = read_observation(folder)
+    perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator(states), vocabulary)
+    graph = perceiver.perceive(observation)
+    ground = ground_subtask(wanted, graph, vocabulary, observation.robot_position_world_m, {})
+    scoped = perceiver.scope(graph, ground)
+    name = "" if loaded is None else loaded.task.name
+    steps = () if loaded is None else loaded.task.plan.subtasks
+    done = steps.index(wanted) if wanted in steps else 0
+    encoder = HashedTextEncoder()
+    references = tuple(EmbeddingRetriever(demonstrations, encoder).retrieve(ground, name, done))
+    detector = make_detector(RunConfig(name, threshold=threshold), vocabulary)
+    verdict = detector.judge(scoped, observation, references)
+    if verdict.decision is Decision.PROCEED:
+        return scoped, verdict, None
+    plan = Plan((wanted,))
+    context = BoundaryContext(
+        task=loaded.task if loaded is not None else Task(name, name, Goal(""), plan, SceneNeeds()),
+        plan=plan,
+        index=0,
+        done=done,
+        subtask=ground,
+        graph=graph,
+        scoped=scoped,
+        observation=observation,
+        references=references,
+    )
+    reasoner = SymbolicReasoner(mine, violations, vocabulary)
+    return scoped, verdict, reasoner.diagnose(context, verdict)

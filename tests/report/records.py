@@ -1,0 +1,457 @@
+"""Synthetic runs with every kind of boundary, made without a simulator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeEnd,
+    EpisodeRecord,
+    Event,
+    ExecutedRecord,
+    SkillOutcome,
+    SkillStatus,
+)
+from forestall.types.facts import GRIPPER, Literal
+from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
+from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.scene import SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import (
+    Calibration,
+    Change,
+    Decision,
+    Diagnosis,
+    Discrepancy,
+    PlanCheck,
+    Reference,
+    Replan,
+    ReplanOutcome,
+    ScoreParts,
+    Verdict,
+)
+
+NOMINAL = (
+    "navigate_to_obj(Potato)",
+    "pick_up(Potato)",
+    "put_on(Potato, Plate)",
+    "pick_up(Plate)",
+    "navigate_to_obj(Microwave)",
+    "put_on(Plate, CounterTop)",
+    "open_obj(Microwave)",
+    "pick_up(Plate)",
+    "put_in(Plate, Microwave)",
+    "close_obj(Microwave)",
+    "toggle_on(Microwave)",
+)
+INSERTED = ("pick_up(Bowl-1)", "put_on(Bowl-1, CounterTop-2)")
+ALARM_INDEX = 7
+CAUSE = "Bowl-1 stands inside Microwave-1, which takes one thing only"
+
+
+def task() -> Task:
+    return Task(
+        name="heat-potato",
+        title="Heat a potato on a clean plate in the microwave",
+        goal=Goal(
+            text="a cooked potato on a clean plate in the microwave, and nothing else in there",
+            variables=(("?potato", "Potato"), ("?plate", "Plate")),
+            literals=(
+                Literal.parse("cooked(?potato)=cooked"),
+                Literal.parse("on_top_of(?potato, ?plate)"),
+                Literal.parse("inside(?plate, Microwave)"),
+            ),
+            never=(Literal.parse("spoiled(?potato)"),),
+            weak=(Literal.parse("cooked(?potato)=cooked"),),
+        ),
+        plan=Plan.parse(NOMINAL),
+        scene=SceneNeeds(),
+    )
+
+
+def frame(seed: int, width: int = 64, height: int = 48, noise: bool = True) -> Frame:
+    rng = np.random.default_rng(seed)
+    if noise:
+        rgb = rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+    else:
+        y, x = np.mgrid[0:height, 0:width]
+        rgb = np.stack(
+            [120 + 100 * x / width, 150 + 60 * y / height, 140 + 40 * np.sin(x / 37 + seed)], -1
+        ).astype(np.uint8)
+        a, b = int(rng.integers(0, width // 2)), int(rng.integers(0, height // 2))
+        rgb[b : b + height // 3, a : a + width // 4] = rng.integers(40, 240, 3)
+    return Frame(
+        rgb,
+        np.ones((height, width), np.float32),
+        Intrinsics.from_vertical_fov(width, height, 60.0),
+        np.eye(4),
+    )
+
+
+def observation(seed: int, frames: int = 1, **kind: object) -> Observation:
+    return Observation(
+        tuple(frame(100 * seed + i, **kind) for i in range(frames)),  # type: ignore[arg-type]
+        GripperState(None, (0.4, 0.2, 1.0)),
+        time_s=4.0 * seed,
+        robot_position_world_m=(1.0, 2.0, 0.0),
+    )
+
+
+def node(
+    name: str, category: str = "", seen: Seen = Seen.VISIBLE, **states: str | None
+) -> ObjectNode:
+    low = (float(len(name)) / 10, 0.5, 0.9)
+    return ObjectNode(
+        name,
+        category or name.rpartition("-")[0] or name,
+        tuple(states.items()),
+        centroid_m=low,
+        box_m=Box(low, (low[0] + 0.1, 0.6, 1.0)),
+        seen=seen,
+        pixels=400,
+    )
+
+
+def relations(*texts: str) -> tuple[Relation, ...]:
+    return tuple(Relation(*text.split()) for text in texts)
+
+
+def plate(**states: str | None) -> ObjectNode:
+    return node(
+        "Plate-1", **({"dirty": "clean", "broken": "intact", "temperature": "room"} | states)
+    )
+
+
+def potato(**states: str | None) -> ObjectNode:
+    return node(
+        "Potato-1", **({"sliced": "whole", "cooked": "raw", "temperature": "room"} | states)
+    )
+
+
+def microwave(**states: str | None) -> ObjectNode:
+    return node("Microwave-1", **({"open": "open", "toggled": "off"} | states))
+
+
+def observed_graph(subtask: Subtask | None = None, bowl: bool = True) -> SceneGraph:
+    """Every kind of node and edge: gripper, remembered, unobserved states, hidden insides."""
+    nodes = [
+        node(GRIPPER, GRIPPER),
+        node("CounterTop-1"),
+        node("CounterTop-2"),
+        microwave(),
+        plate(temperature=None),
+        potato(),
+        node("Mug-1", filled="empty", dirty="dirty", broken="intact", temperature=None),
+        node("Fridge-1", seen=Seen.REMEMBERED, open="closed"),
+        node("Knife-1", seen=Seen.UNOBSERVED, temperature=None),
+    ]
+    edges = [
+        "Plate-1 on_top_of CounterTop-2",
+        "Potato-1 on_top_of Plate-1",
+        "Microwave-1 on_top_of CounterTop-2",
+        "Mug-1 on_top_of CounterTop-1",
+        "Plate-1 left_of Microwave-1",
+        "Microwave-1 right_of Plate-1",
+        "Plate-1 near Microwave-1",
+        "Mug-1 blocking Fridge-1",
+        "Knife-1 inside Fridge-1",
+        "CounterTop-1 near Fridge-1",
+        "Potato-1 above CounterTop-2",
+    ]
+    if bowl:
+        nodes.append(node("Bowl-1", filled=None, dirty=None, broken="intact", temperature=None))
+        edges.append("Bowl-1 inside Microwave-1")
+    return SceneGraph(tuple(nodes), relations(*edges), subtask, ("Fridge-1",))
+
+
+def expected_graph(subtask: Subtask | None = None) -> SceneGraph:
+    """What a demonstration saw: no bowl, a clean mug, a book that is not there now."""
+    return SceneGraph(
+        (
+            node(GRIPPER, GRIPPER),
+            node("CounterTop-1"),
+            node("CounterTop-3"),
+            microwave(),
+            node("Plate-2", "Plate", dirty="clean", broken="intact", temperature="room"),
+            potato(),
+            node("Mug-1", filled="empty", dirty="clean", broken="intact", temperature="room"),
+            node("Fridge-1", open="closed"),
+            node("Book-1", open="closed"),
+        ),
+        relations(
+            "Plate-2 on_top_of CounterTop-3",
+            "Potato-1 on_top_of Plate-2",
+            "Microwave-1 on_top_of CounterTop-3",
+            "Mug-1 on_top_of CounterTop-1",
+            "Book-1 on_top_of CounterTop-1",
+            "Plate-2 left_of Microwave-1",
+            "Plate-2 near Microwave-1",
+            "CounterTop-1 near Fridge-1",
+        ),
+        subtask,
+    )
+
+
+MATCHES = (
+    ("CounterTop-1", "CounterTop-1"),
+    ("CounterTop-2", "CounterTop-3"),
+    ("Fridge-1", "Fridge-1"),
+    ("Microwave-1", "Microwave-1"),
+    ("Mug-1", "Mug-1"),
+    ("Plate-1", "Plate-2"),
+    ("Potato-1", "Potato-1"),
+    (GRIPPER, GRIPPER),
+)
+
+DISCREPANCIES = (
+    Discrepancy(
+        Change.EXTRA_OBJECT, "Bowl-1", "no Bowl", "Bowl-1", "Bowl-1 is there and was not expected"
+    ),
+    Discrepancy(
+        Change.EXTRA_RELATION,
+        "Bowl-1",
+        "nothing inside Microwave-1",
+        "Bowl-1 inside Microwave-1",
+        "Bowl-1 is inside Microwave-1, where nothing was expected",
+    ),
+    Discrepancy(
+        Change.MISSING_OBJECT, "Book-1", "Book-1", "no Book", "a Book was expected and is not there"
+    ),
+    Discrepancy(
+        Change.STATE, "Mug-1", "dirty=clean", "dirty=dirty", "Mug-1 is dirty, expected clean"
+    ),
+)
+
+
+def reference(subtask: Subtask, index: int) -> Reference:
+    return Reference(
+        "demo-0003", "heat-potato", index, subtask, 0.97, expected_graph(subtask), (subtask,)
+    )
+
+
+def verdict(subtask: Subtask, index: int, alarm: bool) -> Verdict:
+    score = 0.734 if alarm else 0.962
+    return Verdict(
+        Decision.REPLAN if alarm else Decision.PROCEED,
+        "scene_graph",
+        score,
+        0.9,
+        Calibration.FIXED,
+        ScoreParts(score, 0.81 if alarm else 0.98, 0.50 if alarm else 0.93, 0.89),
+        reference(subtask, index),
+        MATCHES,
+        DISCREPANCIES if alarm else (),
+        references=4,
+    )
+
+
+def diagnosis() -> Diagnosis:
+    return Diagnosis(
+        CAUSE,
+        (Literal.parse("vacant(Microwave-1)"),),
+        (Literal.parse("on_top_of(Potato-1, Plate-1)"), Literal.parse("dirty(Plate-1)=clean")),
+        ("Bowl-1",),
+        "symbolic",
+    )
+
+
+def solved() -> Replan:
+    rest = (*INSERTED, "pick_up(Plate-1)", "put_in(Plate-1, Microwave-1)", *NOMINAL[9:])
+    return Replan(
+        ReplanOutcome.SOLVED,
+        Plan.parse(rest),
+        PlanCheck(True, assumed=(Literal.parse("temperature(Plate-1)=room"),)),
+        "symbolic",
+        expanded=143,
+        seconds=0.021,
+    )
+
+
+PHASES = (("perceive", 0.182), ("retrieve", 0.004), ("compare", 0.011))
+
+
+def boundary(
+    position: int, index: int, subtask: Subtask, *, alarm: bool = False, **pictures: object
+) -> BoundaryRecord:
+    bowl = index >= ALARM_INDEX - 1
+    more = (("diagnose", 0.006), ("replan", 0.021)) if alarm else ()
+    return BoundaryRecord(
+        index=index,
+        subtask=subtask,
+        graph=observed_graph(bowl=bowl),
+        scoped=observed_graph(subtask, bowl=bowl),
+        observation=observation(position, **pictures),  # type: ignore[arg-type]
+        looks=1,
+        verdict=verdict(subtask, index, alarm),
+        diagnosis=diagnosis() if alarm else None,
+        replan=solved() if alarm else None,
+        seconds=PHASES + more,
+        time_s=4.0 * index,
+    )
+
+
+def potato_record(**pictures: object) -> EpisodeRecord:
+    """Heat a potato with a bowl in the microwave: one alarm, a new plan, success."""
+    rest = solved().plan
+    assert rest is not None
+    done = (*Plan.parse(NOMINAL).subtasks[:ALARM_INDEX], *rest.subtasks)
+    boundaries = []
+    for index, subtask in enumerate(done):
+        if index == ALARM_INDEX:
+            blocked = Subtask.parse("pick_up(Plate-1)")
+            boundaries.append(boundary(len(boundaries), index, blocked, alarm=True, **pictures))
+        boundaries.append(boundary(len(boundaries), index, subtask, **pictures))
+    executed = tuple(
+        ExecutedRecord(s, SkillOutcome(SkillStatus.SUCCEEDED, 4.0), i) for i, s in enumerate(done)
+    )
+    return EpisodeRecord(
+        task=task(),
+        scenario="microwave-occupied",
+        strategy="proactive",
+        seed=7,
+        initial_plan=Plan.parse(NOMINAL),
+        boundaries=tuple(boundaries),
+        executed=executed,
+        end=EpisodeEnd.PLAN_FINISHED,
+        success=True,
+        weak_success=True,
+        events=(
+            Event(0.0, "placed", ("Bowl-1", "Microwave-1"), "a bowl stands in the microwave"),
+            Event(52.0, "cooked", ("Potato-1",), "Potato-1 is cooked"),
+        ),
+        simulated_s=52.0,
+        compute_s=(
+            ("perceive", 2.548),
+            ("retrieve", 0.056),
+            ("compare", 0.154),
+            ("diagnose", 0.006),
+            ("replan", 0.021),
+        ),
+        provenance=(
+            ("perception", {"segmenter": "instance-ids", "state_estimator": "oracle"}),
+            ("memory", {"path": "demos.sqlite", "demonstrations": 40}),
+            ("versions", {"forestall": "0.1.0", "mujoco": "4.0.0", "python": "3.11.9"}),
+            ("renderer", "embree"),
+        ),
+    )
+
+
+def unjudged_record() -> EpisodeRecord:
+    """Strategy "none": no verdicts, no pictures; the last subtask is refused."""
+    whole = potato_record()
+    plan = whole.initial_plan.subtasks
+    refused = SkillOutcome(SkillStatus.REFUSED, 1.0, "Microwave-1 has no room for Plate-1")
+    fine = SkillOutcome(SkillStatus.SUCCEEDED, 4.0)
+    return replace(
+        whole,
+        strategy="none",
+        boundaries=tuple(
+            replace(boundary(i, i, s), observation=None, verdict=None, seconds=(("perceive", 0.1),))
+            for i, s in enumerate(plan[:9])
+        ),
+        executed=tuple(
+            ExecutedRecord(s, refused if i == 8 else fine, i) for i, s in enumerate(plan)
+        ),
+        success=False,
+        weak_success=None,
+        failures=("inside(?plate, Microwave): the plate is on CounterTop-2",),
+        events=(),
+        compute_s=(),
+        provenance=(),
+    )
+
+
+def troubled_record() -> EpisodeRecord:
+    """Alarms without a change, without a plan and without a reference; odd names; stopped."""
+    whole = potato_record()
+    odd = 'Tasse <b>"Süß & 熱い"</b>'
+    graph = SceneGraph(
+        (
+            node(odd, "Tasse <Ü>", filled="<wine>", dirty=None),
+            node("Shelf-1"),
+            node("'; alert(1) //", "x"),
+        ),
+        (Relation(odd, "on_top_of", "Shelf-1"), Relation(odd, "near", "'; alert(1) //")),
+        Subtask("pick_up", (odd,)),
+        ("Shelf-1",),
+    )
+    first = replace(
+        boundary(0, 0, Subtask("navigate_to_obj", (odd,)), alarm=True),
+        diagnosis=Diagnosis("the difference is harmless", ()),
+        replan=None,
+        graph=graph,
+        scoped=graph,
+    )
+    alone = Verdict(
+        Decision.PROCEED,
+        "scene_graph",
+        None,
+        0.9,
+        Calibration.UNCALIBRATED,
+        note="no reference above the floor <0.5>",
+    )
+    second = replace(
+        boundary(1, 1, Subtask("pick_up", (odd,))), verdict=alone, graph=graph, scoped=graph
+    )
+    third = replace(
+        boundary(2, 2, Subtask.parse("put_in(Plate-1, Microwave-1)"), alarm=True),
+        replan=Replan(
+            ReplanOutcome.UNSOLVABLE,
+            check=PlanCheck(False, 1, "no room <left>", (Literal.parse("vacant(Microwave-1)"),)),
+            note="proven on the observed state",
+        ),
+        looks=2,
+    )
+    outcome = SkillOutcome(SkillStatus.FAILED, 2.0, 'dropped "it" <hard>')
+    return replace(
+        whole,
+        task=replace(whole.task, title='Heat <script>alert("ü")</script> & serve'),
+        scenario="wein & <bröt>",
+        initial_plan=Plan((Subtask("navigate_to_obj", (odd,)), Subtask("pick_up", (odd,)))),
+        boundaries=(first, second, third),
+        executed=(
+            ExecutedRecord(
+                Subtask("navigate_to_obj", (odd,)), SkillOutcome(SkillStatus.SUCCEEDED, 3.0), 0
+            ),
+            ExecutedRecord(Subtask("pick_up", (odd,)), outcome, 1),
+        ),
+        end=EpisodeEnd.STOPPED,
+        success=None,
+        weak_success=None,
+        failures=("<nothing> & more",),
+        events=(Event(1.0, "note", (odd,), "it's <odd>"),),
+    )
+
+
+def empty_record() -> EpisodeRecord:
+    """A run that ended before its first boundary."""
+    return EpisodeRecord(
+        task(), None, "proactive", 0, Plan(()), (), (), EpisodeEnd.ERROR, success=False
+    )
+
+
+def calls(record: EpisodeRecord) -> list[tuple[BoundaryContext, StrategyAnswer]]:
+    """What a listener would have been told at the boundaries of a record."""
+    found = []
+    for b in record.boundaries:
+        assert b.observation is not None
+        context = BoundaryContext(
+            task=record.task,
+            plan=record.initial_plan,
+            index=min(b.index, len(record.initial_plan) - 1),
+            done=b.index,
+            subtask=b.subtask,
+            graph=b.graph,
+            scoped=b.scoped,
+            observation=b.observation,
+            looks=b.looks,
+        )
+        decision = Decision.PROCEED if b.verdict is None else b.verdict.decision
+        answer = StrategyAnswer(decision, b.verdict, b.diagnosis, b.replan, seconds=b.seconds)
+        found.append((context, answer))
+    return found
