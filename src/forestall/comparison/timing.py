@@ -1,4 +1,4 @@
-"""How long comparing takes: random graphs from a seed, scored against many references.
+"""How long comparing takes: random graphs from a seed, one scored against many.
 
 Called by `forestall bench speed`; calls batch. Nothing is asserted here.
 """
@@ -6,16 +6,102 @@ Called by `forestall bench speed`; calls batch. Nothing is asserted here.
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import ScoreConfig
-from forestall.embeddings.hashed import HashedTextEncoder
 from forestall.errors import InputError
 from forestall.interfaces import TextEncoder
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
 from forestall.vocabulary import ATTRIBUTES, Vocabulary, household
+
+
+class DirectionEncoder:
+    """Gives each text a random direction of its own, the same each time (a test double)."""
+
+    name = "directions"
+
+    def encode(self, texts: Sequence[str]) -> npt.NDArray[np.float32]:
+        """(n, 64) float32 rows of unit length."""
+        rows = np.empty((len(texts), 64), dtype=np.float32)
+        for i, text in enumerate(texts):
+            row = np.random.default_rng(zlib.crc32(text.encode())).standard_normal(64)
+            rows[i] = row / np.linalg.norm(row)
+        return rows
+
+
+def random_graph(
+    n_nodes: int, rng: np.random.Generator, vocabulary: Vocabulary | None = None
+) -> SceneGraph:
+    """A graph of `n_nodes` nodes (gripper included) with one relation for nearly every object.
+
+    Categories and states are drawn from the vocabulary; a state is unobserved one time in ten.
+    """
+    vocabulary = vocabulary or household()
+    names = sorted(vocabulary.categories)
+    nodes = [ObjectNode(GRIPPER, GRIPPER)]
+    seen: dict[str, int] = {}
+    for category in rng.choice(names, size=n_nodes - 1).tolist():
+        seen[category] = seen.get(category, 0) + 1
+        states = tuple(
+            (a, None if rng.random() < 0.1 else str(rng.choice(ATTRIBUTES[a])))
+            for a in vocabulary[category].attributes
+        )
+        nodes.append(ObjectNode(f"{category}-{seen[category]}", category, states))
+    places = [n for n in nodes[1:] if vocabulary[n.category].receptacle is not None]
+    relations = []
+    for i, node in enumerate(nodes[1:]):
+        if i == 0:
+            relations.append(Relation(node.id, "held_by", GRIPPER))
+        elif places and vocabulary[node.category].pickupable:
+            place = places[int(rng.integers(len(places)))]
+            receptacle = vocabulary[place.category].receptacle
+            if place.id != node.id and receptacle is not None:
+                relations.append(Relation(node.id, receptacle.relation, place.id))
+        other = nodes[1 + int(rng.integers(n_nodes - 1))]
+        if rng.random() < 0.1 and other.id != node.id:
+            relations.append(Relation(node.id, "blocking", other.id))
+    subtask = Subtask("put_in", (nodes[1].id, nodes[2].id)) if n_nodes > 2 else None
+    return SceneGraph(tuple(nodes), tuple(relations), subtask)
+
+
+def score_times(
+    n_references: int,
+    n_nodes: int,
+    seed: int,
+    repeat: int = 10,
+    encoder: TextEncoder | None = None,
+) -> list[float]:
+    """Seconds of each of `repeat` comparisons of a new graph with the same references.
+
+    The references were compared once before, as they are from the second boundary on.
+
+    Args:
+        n_references: how many reference graphs.
+        n_nodes: nodes of each graph.
+        seed: of the graphs.
+        repeat: how many new graphs are compared.
+        encoder: embeds labels; random directions by default.
+
+    Raises:
+        InputError: fewer than one reference or two nodes.
+    """
+    if n_references < 1 or n_nodes < 2:
+        raise InputError("timing needs at least one reference and two nodes")
+    rng = np.random.default_rng(seed)
+    references = [random_graph(n_nodes, rng) for _ in range(n_references)]
+    scorer = BatchScorer(ScoreConfig(), encoder or DirectionEncoder())
+    scorer.scores(random_graph(n_nodes, rng), references)
+    times = []
+    for _ in range(repeat):
+        observed = random_graph(n_nodes, rng)
+        started = time.perf_counter()
+        scorer.scores(observed, references)
+        times.append(time.perf_counter() - started)
+    return times

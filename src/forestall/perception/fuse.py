@@ -29,7 +29,7 @@ from forestall.perception.unproject import Points, robust_box
 from forestall.types.facts import GRIPPER, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import Observation, Vec3
-from forestall.vocabulary import Category, Vocabulary
+from forestall.vocabulary import Vocabulary
 
 _STILL_M = 0.03
 _MOST_POINTS = 6000
@@ -70,9 +70,7 @@ class SceneMemory:
         self._relate(seen, views)
         self._mark(seen, fate, views)
 
-    def _take_in(
-        self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float
-    ) -> set[str]:
+    def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""
         shown: dict[str, list[tuple[View, int]]] = {}
         for view in views:
@@ -155,7 +153,9 @@ class SceneMemory:
 
     def _children(self, name: str) -> list[Track]:
         return [
-            t for _, t in sorted(self.tracks.items()) if t.parent is not None and t.parent[1] == name
+            t
+            for _, t in sorted(self.tracks.items())
+            if t.parent is not None and t.parent[1] == name
         ]
 
     def _drop_from_memory(self, former: str, seen: set[str]) -> None:
@@ -266,12 +266,11 @@ class SceneMemory:
             codes = fate.get(name)
             if name in seen:
                 track.seen = Seen.VISIBLE
-            elif track.points_world_m is None or self._shut_in(track):
-                track.seen = Seen.UNOBSERVED
-            elif codes is not None and float((codes == Fate.OCCLUDED).mean()) > 0.5:
-                track.seen = Seen.UNOBSERVED
             else:
-                track.seen = Seen.REMEMBERED
+                covered = codes is not None and float((codes == Fate.OCCLUDED).mean()) > 0.5
+                lost = track.points_world_m is None
+                out_of_sight = lost or covered or self._shut_in(track)
+                track.seen = Seen.UNOBSERVED if out_of_sight else Seen.REMEMBERED
             if name == self._held and name not in seen:
                 track.seen = Seen.REMEMBERED
 
@@ -305,9 +304,6 @@ class SceneMemory:
         )
 
     # --- small questions ------------------------------------------------------------------------
-
-    def _category(self, name: str) -> Category | None:
-        return self._vocabulary.find(name)
 
     def _is_fixture(self, category: str) -> bool:
         found = self._vocabulary.find(category)

@@ -56,7 +56,7 @@ def label_image(detections: Sequence[Detection], shape: tuple[int, int]) -> Labe
 
 @lru_cache(maxsize=4)
 def _lattice(width: int, height: int) -> npt.NDArray[np.uint16]:
-    """u | v: its low k bits are zero on a lattice of stride 2^k."""
+    """Column | row: its low k bits are zero on a lattice of stride 2^k."""
     u = np.arange(width, dtype=np.uint16)
     v = np.arange(height, dtype=np.uint16)
     return (u[None, :] | v[:, None]).ravel()
@@ -103,9 +103,11 @@ def clouds(
     boxes = _image_boxes(labels, count)
     if count == 0:
         return []
-    index, owner = _sampled_pixels(frame, flat, pixels, config.max_points)
+    low_bits = _low_bits(pixels, config.max_points)
+    index, owner = _sampled_pixels(frame, flat, low_bits)
     points = _to_world(frame, index)
-    owner, points, weights = _thin(points, owner, np.asarray(voxel_m), config)
+    worth = (low_bits + 1.0) ** 2
+    owner, points, weights = _thin(points, owner, np.asarray(voxel_m), worth, config)
     starts = np.searchsorted(owner, np.arange(count + 1))
     result: list[Cloud | None] = []
     for i in range(count):
@@ -144,12 +146,17 @@ def _image_boxes(labels: Labels, count: int) -> list[tuple[int, int, int, int]]:
     return boxes
 
 
+def _low_bits(pixels: npt.NDArray[np.int64], max_points: int) -> npt.NDArray[np.int64]:
+    """For each mask, stride of its lattice minus one; strides are powers of two."""
+    stride = np.sqrt(np.maximum(pixels / max_points, 1.0))
+    bits: npt.NDArray[np.int64] = np.left_shift(1, np.ceil(np.log2(stride)).astype(np.int64)) - 1
+    return bits
+
+
 def _sampled_pixels(
-    frame: Frame, flat: Labels, pixels: npt.NDArray[np.int64], max_points: int
+    frame: Frame, flat: Labels, low_bits: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Flat indices and labels of the pixels that are unprojected."""
-    stride = np.sqrt(np.maximum(pixels / max_points, 1.0))
-    low_bits = np.left_shift(1, np.ceil(np.log2(stride)).astype(np.int64)) - 1
     table = np.append(low_bits, 0).astype(np.uint16)
     lattice = _lattice(frame.intrinsics.width, frame.intrinsics.height)
     keep = (lattice & table[flat]) == 0
@@ -173,9 +180,13 @@ def _thin(
     points: Points,
     owner: npt.NDArray[np.int64],
     voxel_m: Points,
+    worth: Points,
     config: PerceptionConfig,
 ) -> tuple[npt.NDArray[np.int64], Points, Points]:
-    """Voxel means, outliers removed: owner, point and pixel count of each voxel, by owner."""
+    """Voxel means, outliers removed: owner, point and pixels of each voxel, by owner.
+
+    `worth` is how many pixels a sampled one of each owner stands for.
+    """
     cell = np.floor(points / voxel_m[owner][:, None]).astype(np.int64) + _GRID_HALF
     np.clip(cell, 0, 2 * _GRID_HALF - 1, out=cell)
     key = _key(owner, cell)
@@ -187,6 +198,7 @@ def _thin(
         return owner, points, weights
     means = np.add.reduceat(points[order], starts, axis=0) / weights[:, None]
     first = order[starts]
+    weights *= worth[owner[first]]
     keep = _supported(owner[first], cell[first] >> _COARSE, weights, config.min_cell_support)
     return owner[first][keep], means[keep], weights[keep]
 
@@ -208,7 +220,9 @@ def _supported(
     total = held.copy()
     for step in (1, 1 << _GRID_BITS, 1 << (2 * _GRID_BITS)):
         at = np.searchsorted(cells, cells + step)
-        hit = np.flatnonzero((at < len(cells)) & (cells[np.minimum(at, len(cells) - 1)] - step == cells))
+        hit = np.flatnonzero(
+            (at < len(cells)) & (cells[np.minimum(at, len(cells) - 1)] - step == cells)
+        )
         np.add.at(total, hit, held[at[hit]])
         np.add.at(total, at[hit], held[hit])
     enough: npt.NDArray[np.bool_] = (total >= least)[inverse]

@@ -43,10 +43,10 @@ class Automatic:
                 for liquid in ATTRIBUTES["filled"][1:]:
                     both = (x,) if liquid == "water" else (x, receptacle)
                     condition: Path = (("is", receptacle, "filled", liquid),)
-                    changes.append(Change(condition, (), tuple(layout.spoils(*both))))
+                    changes.append(Change(condition, (), layout.spoils(*both)))
             if layout.has(receptacle, "dirty"):
                 dirt: Atom = ("is", receptacle, "dirty", "dirty")
-                spoilt = tuple(layout.spoils(x))
+                spoilt = layout.spoils(x)
                 if layout.has(x, "sliced") and layout.initially(x, "sliced") == "sliced":
                     changes.append(Change((dirt,), (), spoilt))
                 elif layout.has(x, "cooked"):
@@ -58,7 +58,7 @@ class Automatic:
         """Liquid comes into a vessel: food in it is spoiled."""
         layout = self.layout
         return [
-            Change((*condition, place), (), tuple(layout.spoils(y)))
+            Change((*condition, place), (), layout.spoils(y))
             for y, place in layout.holders(vessel)
             if layout.category(y).food
         ]
@@ -92,7 +92,7 @@ class Automatic:
         if len(chain) == 1:
             if device.cleans and layout.has(x, "dirty"):
                 clean = layout.becomes(x, "dirty", "clean")
-                changes.append(Change(condition, *map(tuple, clean)))
+                changes.append(Change(condition, *clean))
             if device.fills is not None and layout.has(x, "filled"):
                 changes += self._fill(x, device, device.fills, condition)
         changes += self._temper_and_cook(x, device, condition, chain)
@@ -104,7 +104,7 @@ class Automatic:
     def _fill(self, x: str, device: Device, liquid: str, condition: Path) -> list[Change]:
         layout = self.layout
         changes: list[Change] = []
-        spoilt = tuple(layout.spoils(x))
+        spoilt = layout.spoils(x)
         for now in ATTRIBUTES["filled"] if device.brews else ():
             before: Path = (*condition, ("is", x, "filled", now))
             if now == liquid:
@@ -115,9 +115,9 @@ class Automatic:
                 changes.append(Change((*before, ("is", x, "dirty", "dirty")), (), spoilt))
             changes += [Change((*before, p), (), spoilt) for _, p in layout.holders(x)]
         empty: Path = (*condition, ("is", x, "filled", "empty"))
-        changes.append(Change(empty, *map(tuple, layout.becomes(x, "filled", liquid))))
+        changes.append(Change(empty, *layout.becomes(x, "filled", liquid)))
         if not device.heats and layout.has(x, "temperature"):
-            changes.append(Change(empty, *map(tuple, layout.becomes(x, "temperature", "room"))))
+            changes.append(Change(empty, *layout.becomes(x, "temperature", "room")))
         return changes + self.soaked(x, empty)
 
     def _temper_and_cook(
@@ -128,16 +128,16 @@ class Automatic:
         for works, value in ((device.heats, "hot"), (device.cools, "cold")):
             if works and layout.has(x, "temperature"):
                 warm = layout.becomes(x, "temperature", value)
-                changes.append(Change(condition, *map(tuple, warm)))
+                changes.append(Change(condition, *warm))
         if not (layout.has(x, "cooked") and may_cook(device, layout.kind(x))):
             return changes
         raw: Path = (*condition, ("is", x, "cooked", "raw"))
-        changes.append(Change(raw, *map(tuple, layout.becomes(x, "cooked", "cooked"))))
+        changes.append(Change(raw, *layout.becomes(x, "cooked", "cooked")))
         for container in chain[:-1]:
             if layout.has(container, "dirty"):
                 dirt: Atom = ("is", container, "dirty", "dirty")
-                changes.append(Change((*raw, dirt), (), tuple(layout.spoils(x))))
+                changes.append(Change((*raw, dirt), (), layout.spoils(x)))
         for other, place in layout.holders(chain[0]):
             if layout.category(other).food and layout.kind(other) != layout.kind(x):
-                changes.append(Change((*raw, place), (), tuple(layout.spoils(x, other))))
+                changes.append(Change((*raw, place), (), layout.spoils(x, other)))
         return changes

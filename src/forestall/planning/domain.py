@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from forestall.planning.effects import arrive, set_value, settle, soak, spoil
 from forestall.planning.state import Place, State, by_number, number_of
-from forestall.types.facts import GRIPPER, Literal, is_instance
+from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.plan import Subtask
 
 __all__ = ["Place", "Refusal", "State", "apply", "products", "resolve"]
@@ -76,27 +76,26 @@ def _resolved(state: State, subtask: Subtask, position: int) -> str:
     if state.vocabulary.find(name) is None:
         raise _RefusedError(f"there is no object called {subtask.args[position]!r}")
     found = () if is_instance(name) else state.instances(name)
-    if not found:
-        found = _expected_inside(state, name)
+    controls = state.vocabulary[name].controls
+    if not found and controls is not None and not state.instances(category_of(name)):
+        partner = controls + name.removeprefix(category_of(name))
+        return _resolved(state, Subtask(subtask.skill, (partner,)), 0)
+    found = found or _expected_inside(state, name)
     if not found:
         raise _RefusedError(
             f"no {name} has been seen: its place is not known", Literal("located", (name,))
         )
-    if state.held in found:
+    if position == 0 and state.held in found:
         return str(state.held)
-    role = position if subtask.skill in ("put_on", "put_in") else 0
-    fits = [x for x in found if _suits(state, subtask.skill, x, role)]
-    return (fits or [x for x in found if x not in state.lost] or list(found))[0]
+    if position == 1:
+        found = tuple(x for x in found if x != state.held) or found
 
+    def ease(thing: str) -> tuple[bool, bool, bool, tuple[str, int]]:
+        hindered = not state.has_room(thing) if position == 1 else bool(state.blockers(thing))
+        closed = state.closed_around(thing) is not None
+        return thing in state.lost, closed, hindered, by_number(thing)
 
-def _suits(state: State, skill: str, name: str, role: int) -> bool:
-    if name in state.lost or state.closed_around(name) is not None:
-        return False
-    if role == 1:
-        return state.has_room(name)
-    if skill == "pour":
-        return state.value(name, "filled") in (None, "empty")
-    return not state.blockers(name)
+    return min(found, key=ease)
 
 
 def _expected_inside(state: State, name: str) -> tuple[str, ...]:
@@ -158,16 +157,18 @@ def _pick_up(state: State, name: str) -> None:
         raise _RefusedError(
             f"{blockers[0]} stands in front of {name}", Literal("unblocked", (name,))
         )
-    state.places.pop(name, None)
+    place = state.places.pop(name, None)
     state.blocking = frozenset(pair for pair in state.blocking if name not in pair)
-    state.held = state.at = name
+    if state.at == name or state.at is None:
+        state.at = None if place is None else place.parent
+    state.held = name
 
 
 def _put(state: State, name: str, receptacle: str) -> None:
     shape = state.category(receptacle).receptacle
     place = state.places.get(name)
-    if state.held != name and place is not None and place.parent == receptacle:
-        state.at = receptacle
+    settled = place is not None and place.parent == receptacle
+    if state.held != name and settled and not state.category(name).pickupable:
         return
     if shape is None or not state.vocabulary.accepts(receptacle, name):
         raise _RefusedError(f"{receptacle} does not take {state.kinds[name]}")
@@ -224,6 +225,8 @@ def _toggled_thing(state: State, name: str) -> str:
 def _toggle_on(state: State, name: str) -> None:
     thing = _toggled_thing(state, name)
     device = state.category(thing).device
+    if state.value(thing, "toggled") == "on":
+        return
     if device and device.needs_closed and state.value(thing, "open") == "open":
         raise _RefusedError(
             f"{thing} is open and cannot be turned on", Literal("open", (thing,), "closed")
@@ -262,25 +265,29 @@ def _crack(state: State, name: str) -> None:
     _within_hand(state, name)
     place = state.places.get(name)
     if state.held == name:
-        place = _under_hand(state, name, category.cracks_into)
-        if place is None:
-            raise _RefusedError(f"nothing to crack {name} into is below the gripper")
+        place = _under_hand(state, category.cracks_into)
     (made,) = _replace(state, name, products(state, category.cracks_into, 1))
     if place is not None:
         arrive(state, made, place)
         state.at = place.parent
 
 
-def _under_hand(state: State, name: str, made: str) -> Place | None:
-    vessel = state.at
-    if vessel is None or vessel == name or vessel not in state.kinds:
-        return None
-    shape = state.category(vessel).receptacle
-    if shape is None or not state.vocabulary.accepts(vessel, made):
-        return None
-    if state.closed_around(vessel) is not None or not state.has_room(vessel):
-        return None
-    return Place(shape.relation, vessel)
+def _under_hand(state: State, made: str) -> Place | None:
+    """Where something let go of lands: the vessel on what the robot faces, that, or below it."""
+    focus = state.at
+    candidates: list[str] = []
+    if focus is not None and focus in state.kinds and focus not in state.lost:
+        shape = state.category(focus).receptacle
+        if shape is not None and shape.capacity is not None:
+            candidates += state.contents(focus)
+        candidates += [focus, *(p.parent for p in state.chain(focus))]
+    for vessel in (*candidates, *state.instances("Floor")):
+        shape = state.category(vessel).receptacle
+        if shape is None or not state.vocabulary.accepts(vessel, made):
+            continue
+        if state.closed_around(vessel) is None and state.has_room(vessel):
+            return Place(shape.relation, vessel)
+    return None
 
 
 def _replace(state: State, old: str, new: tuple[str, ...]) -> tuple[str, ...]:
@@ -316,16 +323,14 @@ def _pour(state: State, name: str, target: str) -> None:
         raise _RefusedError(
             f"{name} is empty: there is nothing to pour", Literal("filled", (name,), "water")
         )
+    drains, now = state.category(target).drains, state.value(target, "filled")
+    if target == name or not (drains or now is not None):
+        raise _RefusedError(f"nothing can be poured from {name} into {target}")
     _within_hand(state, target)
-    if not state.category(target).drains:
-        now = state.value(target, "filled")
-        if now is None or target == name:
-            raise _RefusedError(f"nothing can be poured from {name} into {target}")
-        if now != "empty":
-            raise _RefusedError(
-                f"{target} is already filled with {now}", Literal("filled", (target,), "empty")
-            )
-        set_value(state, target, "filled", liquid)
+    if not drains:
+        if now == "empty":
+            set_value(state, target, "filled", liquid)
+            set_value(state, target, "temperature", state.value(name, "temperature") or "room")
         soak(state, target)
     set_value(state, name, "filled", "empty")
     state.at = target

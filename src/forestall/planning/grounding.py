@@ -16,6 +16,7 @@ from forestall.vocabulary import ATTRIBUTES, Category
 
 MAX_DEPTH = 3
 
+Switch = tuple[tuple[Atom, ...], tuple[Atom, ...]]
 Room = tuple[list[Atom], list[Atom], list[Atom]]
 
 
@@ -83,14 +84,14 @@ class Layout:
         value = self.state.value(name, attribute)
         return value or self.state.vocabulary.default_states(self.kind(name))[attribute]
 
-    def becomes(self, name: str, attribute: str, value: str) -> tuple[list[Atom], list[Atom]]:
+    def becomes(self, name: str, attribute: str, value: str) -> Switch:
         """Atoms to add and to delete when an attribute takes a value."""
-        others = [("is", name, attribute, v) for v in ATTRIBUTES[attribute] if v != value]
-        return [("is", name, attribute, value)], list(others)
+        others = tuple(("is", name, attribute, v) for v in ATTRIBUTES[attribute] if v != value)
+        return (("is", name, attribute, value),), others
 
-    def spoils(self, *names: str) -> list[Atom]:
+    def spoils(self, *names: str) -> tuple[Atom, ...]:
         """Atoms to delete when things are spoiled."""
-        return [("intact", n) for n in names if n in self.watched]
+        return tuple(("intact", n) for n in names if n in self.watched)
 
     def place(self, name: str, receptacle: str) -> Atom:
         """The atom of a thing in or on a receptacle as a skill puts it."""
@@ -150,15 +151,23 @@ class Layout:
 
     def inherits(self, source: str, made: str) -> list[Change]:
         """What a made thing takes over from its source."""
-        changes: list[Change] = []
-        for attribute in ("cooked", "temperature"):
-            if self.has(source, attribute) and self.has(made, attribute):
-                for value in ATTRIBUTES[attribute]:
-                    condition: Atom = ("is", source, attribute, value)
-                    changes.append(Change((condition,), *map(tuple, self.becomes(made, attribute, value))))
+        changes = self.copies(source, made, "cooked") + self.tempers(source, made)
         if source in self.watched and made in self.watched:
             changes.append(Change((("not", "intact", source),), (), (("intact", made),)))
         return changes
+
+    def tempers(self, source: str, target: str) -> list[Change]:
+        """A thing takes over the temperature of another."""
+        return self.copies(source, target, "temperature")
+
+    def copies(self, source: str, target: str, attribute: str) -> list[Change]:
+        """A thing takes over an attribute of another, where both have it."""
+        if not (self.has(source, attribute) and self.has(target, attribute)):
+            return []
+        return [
+            Change((("is", source, attribute, v),), *self.becomes(target, attribute, v))
+            for v in ATTRIBUTES[attribute]
+        ]
 
     def initial(self) -> set[Atom]:
         """Every atom that holds at first."""

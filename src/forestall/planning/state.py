@@ -192,9 +192,9 @@ class State:
             return ()
         if device.acts_on is None:
             return (name,)
-        return tuple(
-            x for x in self.instances(device.acts_on) if number_of(x) == number_of(name)
-        )
+        partners = self.instances(device.acts_on)
+        own = tuple(x for x in partners if number_of(x) == number_of(name))
+        return own or partners[:1]
 
     def working(self, name: str) -> Device | None:
         """The device of a thing, if it works now."""

@@ -34,9 +34,9 @@ class Draft:
     """An operator before its atoms are numbered."""
 
     subtask: Subtask
-    condition: list[Atom]
-    add: list[Atom]
-    delete: list[Atom]
+    condition: Sequence[Atom]
+    add: Sequence[Atom]
+    delete: Sequence[Atom]
     changes: list[Change] = field(default_factory=list)
 
 
@@ -202,7 +202,7 @@ def _pour(layout: Layout, effects: Automatic, x: str) -> Iterator[Draft]:
                 condition += [*layout.reachable(target), ("is", target, "filled", "empty")]
                 more, less = layout.becomes(target, "filled", liquid)
                 add, delete = add + more, delete + less
-                changes = effects.soaked(target, ())
+                changes = effects.soaked(target, ()) + layout.tempers(x, target)
             yield Draft(Subtask("pour", (x, target)), condition, add, delete, changes)
 
 
@@ -248,17 +248,12 @@ def _goal_atoms(layout: Layout, literal: Literal) -> list[Atom]:
 def _number(layout: Layout, drafts: list[Draft], goals: list[list[Atom]]) -> Problem:
     """Drop what can never run, add complements, and give every atom a bit."""
     initial = layout.initial()
-    drafts, possible = _reachable(drafts, initial)
+    drafts = _reachable(drafts, initial)
     asked = {a for goal in goals for a in goal}
     asked |= {a for d in drafts for a in d.condition}
     asked |= {a for d in drafts for c in d.changes for a in c.condition}
     complements = {a[1:] for a in asked if a[0] == "not"}
-    changing = {a for d in drafts for c in _all_changes(d) for a in (*c.add, *c.delete)}
-    atoms = sorted(
-        ({a for a in asked if a[0] != "not"} & (possible | asked))
-        | {a for a in changing if a in possible}
-        | {("not", *a) for a in complements}
-    )
+    atoms = sorted(asked)
     bits = {a: 1 << i for i, a in enumerate(atoms)}
 
     def mask(group: Iterable[Atom]) -> int:
@@ -272,20 +267,22 @@ def _number(layout: Layout, drafts: list[Draft], goals: list[list[Atom]]) -> Pro
         delete = [*change.delete, *(("not", *a) for a in change.add)]
         return Effect(mask(change.condition), mask(add), mask(delete) & ~mask(add))
 
-    operators = tuple(
-        Operator(d.subtask, mask(d.condition), tuple(effect(c) for c in _all_changes(d)))
-        for d in drafts
-    )
+    operators = []
+    for d in drafts:
+        first, *others = (effect(c) for c in _all_changes(d))
+        effects = (first, *(e for e in others if e.add or e.delete))
+        if any(e.add or e.delete for e in effects):
+            operators.append(Operator(d.subtask, mask(d.condition), effects))
     start = mask(initial) | mask(("not", *a) for a in complements if a not in initial)
-    return Problem(tuple(atoms), start, tuple(mask(g) for g in goals), operators)
+    return Problem(tuple(atoms), start, tuple(mask(g) for g in goals), tuple(operators))
 
 
 def _all_changes(draft: Draft) -> list[Change]:
     return [Change((), tuple(draft.add), tuple(draft.delete)), *draft.changes]
 
 
-def _reachable(drafts: list[Draft], initial: set[Atom]) -> tuple[list[Draft], set[Atom]]:
-    """Operators and changes that the relaxed problem can reach, and every atom it reaches."""
+def _reachable(drafts: list[Draft], initial: set[Atom]) -> list[Draft]:
+    """Operators and changes that the relaxed problem can reach."""
     possible = set(initial)
     waiting, done = list(drafts), []
     progress = True
@@ -307,4 +304,4 @@ def _reachable(drafts: list[Draft], initial: set[Atom]) -> tuple[list[Draft], se
     for draft in done:
         draft.changes = [c for c in draft.changes if open_now(c.condition)]
     order = {id(d): i for i, d in enumerate(drafts)}
-    return sorted(done, key=lambda d: order[id(d)]), possible
+    return sorted(done, key=lambda d: order[id(d)])

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.errors import SceneError
 from forestall.types.facts import category_of
 from forestall.types.observation import Frame, Intrinsics, Vec3
@@ -114,7 +115,7 @@ class FlatWorld:
         """Where a thing is on the row."""
         if name not in self._parents:
             raise SceneError(f"{name} is not in the flat scene")
-        if name == self._held or name == FLOOR:
+        if name in (self._held, FLOOR):
             return self._robot_x_m
         if name in self._lying_x_m:
             return self._lying_x_m[name]
@@ -249,6 +250,17 @@ class FlatRenderer:
         rgb = np.zeros((height, width, 3), dtype=np.uint8)
         rgb[..., 0] = np.clip(ids + 1, 0, 255)
         return Frame(rgb, depth, self._intrinsics, camera_to_world.copy(), ids, names)
+
+
+def flat_environment(needs: SceneNeeds, vocabulary: Vocabulary) -> KitchenEnvironment:
+    """A whole environment without geometry: the true rules on a flat world."""
+    return KitchenEnvironment(
+        needs,
+        vocabulary,
+        intrinsics=Intrinsics.from_vertical_fov(64, 48, 60.0),
+        build=lambda n, seed, v: FlatWorld(flat_scene(n, seed, v)),
+        make=lambda _, intrinsics: FlatRenderer(intrinsics),
+    )
 
 
 def flat_scene(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> FlatScene:

@@ -300,9 +300,7 @@ def _under_the_hand(robot: Robot, category: str) -> str | None:
 
 def _has_space(home: Household, place: str) -> bool:
     kind = home.category(place).receptacle
-    return (
-        kind is not None and (kind.capacity is None or len(home.contents(place)) < kind.capacity)
-    )
+    return kind is not None and (kind.capacity is None or len(home.contents(place)) < kind.capacity)
 
 
 def pour(robot: Robot, what: str, target: str) -> str:

@@ -1,0 +1,26 @@
+"""States that somebody wrote down: for stored observations and for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from forestall.types.observation import Detection, Frame
+
+
+class GivenStateEstimator:
+    """Hands on states by instance name; nothing is known of other instances.
+
+    Args:
+        states: instance name → attribute → value.
+    """
+
+    name = "given states"
+
+    def __init__(self, states: Mapping[str, Mapping[str, str]]) -> None:
+        self._states = {k: dict(v) for k, v in states.items()}
+
+    def estimate(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> Sequence[Mapping[str, str | None]]:
+        """See the Protocol."""
+        return [dict(self._states.get(d.instance or "", {})) for d in detections]

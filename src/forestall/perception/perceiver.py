@@ -1,0 +1,115 @@
+"""The perceiver: images, depth, masks and the hand in, one fused scene graph out.
+
+Called by the runtime; calls a segmenter and a state estimator (given by the constructor), then
+`unproject.py` for each frame and `fuse.py` once for each observation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from forestall.errors import PerceptionError
+from forestall.interfaces import Segmenter, StateEstimator
+from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.fuse import SceneMemory
+from forestall.perception.naming import name_detections
+from forestall.perception.scope import scope
+from forestall.perception.tracks import View
+from forestall.perception.unproject import Points, clouds, label_image
+from forestall.types.facts import category_of
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Detection, Frame, Observation
+from forestall.types.plan import Subtask
+from forestall.vocabulary import Vocabulary
+
+
+class GraphPerceiver:
+    """Implements the Perceiver Protocol.
+
+    Args:
+        segmenter: where masks come from.
+        state_estimator: where states come from.
+        vocabulary: categories, their attributes and what goes where.
+        config: thresholds.
+        scope_config: what a subtask's graph keeps.
+    """
+
+    def __init__(
+        self,
+        segmenter: Segmenter,
+        state_estimator: StateEstimator,
+        vocabulary: Vocabulary,
+        config: PerceptionConfig | None = None,
+        scope_config: ScopeConfig | None = None,
+    ) -> None:
+        self._segmenter = segmenter
+        self._estimator = state_estimator
+        self._vocabulary = vocabulary
+        self._config = config or PerceptionConfig()
+        self._scope = scope_config or ScopeConfig()
+        self._memory = SceneMemory(vocabulary, self._config)
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._memory.reset()
+
+    def perceive(self, observation: Observation) -> SceneGraph:
+        """Fuse an observation and return the whole graph as believed now.
+
+        Raises:
+            PerceptionError: a frame without the masks that the segmenter needs, or a state
+                estimator that does not answer for every detection.
+        """
+        known: dict[str, Points] = {
+            n: t.centroid_m for n, t in self._memory.tracks.items() if t.points_world_m is not None
+        }
+        views = []
+        for frame in observation.frames:
+            view = self._view(frame, known)
+            for name, cloud in zip(view.ids, view.clouds, strict=True):
+                if cloud is not None:
+                    known[name] = cloud.centroid_m
+            views.append(view)
+        self._memory.integrate(observation, views)
+        return self._memory.graph()
+
+    def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
+        """The part of a graph that concerns a (grounded) subtask, with its subtask node."""
+        return scope(graph, subtask, self._vocabulary, self._scope)
+
+    def describe(self) -> Mapping[str, str]:
+        """Which segmenter and state estimator are used (goes into every record)."""
+        return {"segmenter": self._segmenter.name, "state_estimator": self._estimator.name}
+
+    def _view(self, frame: Frame, known: Mapping[str, Points]) -> View:
+        detections = self._segmenter.segment(frame)
+        states = self._estimator.estimate(frame, detections)
+        if len(states) != len(detections):
+            raise PerceptionError(
+                f"the state estimator {self._estimator.name!r} answered for {len(states)} of "
+                f"{len(detections)} detections"
+            )
+        labels = label_image(detections, frame.depth_m.shape)
+        found = clouds(frame, labels, [self._voxel_m(d) for d in detections], self._config)
+        names = name_detections(detections, found, known, self._config.same_place_m)
+        return View(
+            frame=frame,
+            labels=labels,
+            ids=tuple(names),
+            categories=tuple(_category(d, n) for d, n in zip(detections, names, strict=True)),
+            clouds=tuple(found),
+            states=tuple(states),
+        )
+
+    def _voxel_m(self, detection: Detection) -> float:
+        category = self._vocabulary.find(detection.category)
+        if category is not None and category.fixture:
+            return self._config.fixture_voxel_m
+        return self._config.voxel_m
+
+
+def _category(detection: Detection, name: str) -> str:
+    return detection.category or category_of(name)
+
+
+__all__: Sequence[str] = ["GraphPerceiver"]

@@ -1,0 +1,151 @@
+"""The planner: from an observed state and a goal to a readable plan.
+
+Called by `replanning/`; calls `relevance`, `translate`, `search`. Driving is not searched for:
+`navigate_to_obj` steps are put in afterwards where the next manipulation is at another place.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from forestall.planning.domain import Refusal, State, apply
+from forestall.planning.problem import Problem
+from forestall.planning.relevance import Conjunction, alternatives, universe
+from forestall.planning.search import SearchConfig, SearchOutcome, solve
+from forestall.planning.translate import UnsupportedError, translate
+from forestall.types.facts import GRIPPER
+from forestall.types.plan import Subtask
+from forestall.types.task import Goal
+from forestall.types.verdict import ReplanOutcome
+
+OUTCOMES = {
+    SearchOutcome.SOLVED: ReplanOutcome.SOLVED,
+    SearchOutcome.UNSOLVABLE: ReplanOutcome.UNSOLVABLE,
+    SearchOutcome.TIMEOUT: ReplanOutcome.TIMEOUT,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """What planning gave: subtasks when solved, the state after them, and what it cost."""
+
+    outcome: ReplanOutcome
+    subtasks: tuple[Subtask, ...] = ()
+    final: State | None = None
+    expanded: int = 0
+    seconds: float = 0.0
+    note: str = ""
+
+
+def plan_to(
+    state: State,
+    goals: Sequence[Conjunction],
+    config: SearchConfig | None = None,
+    also: Iterable[str] = (),
+) -> Planned:
+    """Plan from a state to any one of some ground conjunctions."""
+    start_s = time.perf_counter()
+    if not goals:
+        return Planned(ReplanOutcome.UNSOLVABLE, note="nothing that is known can meet the goal")
+    try:
+        problem = pose(state, goals, also)
+    except UnsupportedError as error:
+        return Planned(ReplanOutcome.UNSUPPORTED, note=str(error))
+    found = solve(problem, config)
+    outcome = OUTCOMES[found.outcome]
+    subtasks: tuple[Subtask, ...] = ()
+    final, note = None, ""
+    if outcome is ReplanOutcome.SOLVED:
+        manipulations = [problem.operators[i] for i in found.steps]
+        subtasks, final, note = _with_driving(
+            state, [(o.subtask, _cracked_into(problem, o.effects[0].add)) for o in manipulations]
+        )
+        if final is None:
+            outcome = ReplanOutcome.REJECTED
+    elif outcome is ReplanOutcome.UNSOLVABLE:
+        note = _why_not(state, goals)
+    else:
+        note = f"no plan within the limits ({found.expanded} states expanded)"
+    return Planned(outcome, subtasks, final, found.expanded, time.perf_counter() - start_s, note)
+
+
+def plan_goal(state: State, goal: Goal, config: SearchConfig | None = None) -> Planned:
+    """Plan from a state to a task's goal, whatever binding of its variables is nearest."""
+    goals = alternatives(state, goal)
+    if not goals:
+        missing = [c for _, c in goal.variables if not _anywhere(state, c)]
+        missing += [a for x in goal.literals for a in x.args if _nowhere(state, a)]
+        names = ", ".join(dict.fromkeys(missing)) or "what the goal asks for"
+        return Planned(ReplanOutcome.UNSOLVABLE, note=f"{names}: its place is not known")
+    return plan_to(state, goals, config)
+
+
+def pose(state: State, goals: Sequence[Conjunction], also: Iterable[str] = ()) -> Problem:
+    """The ground problem of a state and goal alternatives.
+
+    Raises:
+        UnsupportedError: no alternative can be expressed.
+    """
+    return translate(state, goals, universe(state, goals, also))
+
+
+def _cracked_into(problem: Problem, add: int) -> str | None:
+    return next((a[3] for a in problem.names(add) if a[0] == "at"), None)
+
+
+def _with_driving(
+    state: State, steps: Sequence[tuple[Subtask, str | None]]
+) -> tuple[tuple[Subtask, ...], State | None, str]:
+    """Insert navigation, executing along; the final state is None if a step does not run."""
+    plan: list[Subtask] = []
+    where: str | None = None
+    for subtask, goes_to in steps:
+        subject = subtask.args[-1]
+        crack = subtask.skill == "crack_obj"
+        if crack and goes_to is not None:
+            subject = goes_to
+        place = state.root(subject)
+        device = state.category(subject).device
+        if device is not None and device.acts_on is not None and state.targets(subject):
+            place = state.targets(subject)[0]
+        steps_here = [subtask]
+        if (place != where or crack) and subject != state.held:
+            steps_here.insert(0, Subtask("navigate_to_obj", (_landmark(state, subject),)))
+        where = place
+        for step in steps_here:
+            after = apply(state, step)
+            if isinstance(after, Refusal):
+                return tuple(plan), None, f"{step} does not run: {after.reason}"
+            state = after
+            plan.append(step)
+    return tuple(plan), state, ""
+
+
+def _landmark(state: State, name: str) -> str:
+    """What to drive to for a thing: the container that it is inside, else itself."""
+    for place in state.chain(name):
+        if state.vocabulary.encloses(place.parent) or place.parent == state.root(name):
+            if place.relation == "inside":
+                return place.parent
+    return name
+
+
+def _anywhere(state: State, category: str) -> bool:
+    return any(x not in state.lost for x in state.matches(category))
+
+
+def _nowhere(state: State, name: str) -> bool:
+    return name != GRIPPER and not name.startswith("?") and not _anywhere(state, name)
+
+
+def _why_not(state: State, goals: Sequence[Conjunction]) -> str:
+    """A reason for a proven dead end, naming what is lost if something is."""
+    lost = sorted({a for goal in goals for x in goal for a in x.args if a in state.lost})
+    if lost:
+        return f"{', '.join(lost)}: its place is not known"
+    facts = [
+        x for x in goals[0] if not x.predicate.startswith("not ") and not state.holds(x)
+    ]
+    return "no sequence of skills leads to " + ", ".join(map(str, facts or goals[0]))

@@ -1,0 +1,139 @@
+"""Task and scenario files: the shipped ones are sound, and wrong ones are named."""
+
+from pathlib import Path
+
+import pytest
+
+from forestall.benchmark.files import (
+    load_scenario,
+    load_task,
+    scenario_names,
+    schemas,
+    task_names,
+)
+from forestall.errors import FileFormatError, InputError, UnknownNameError
+
+TASKS = {
+    "heat-potato",
+    "make-coffee",
+    "boil-water",
+    "toast-bread",
+    "cook-egg",
+    "make-salad",
+    "store-egg",
+    "water-plant",
+    "switch-devices",
+    "warm-water",
+}
+SCENARIOS = {
+    "microwave-occupied",
+    "plate-dirty",
+    "microwave-left-closed",
+    "coffee-machine-occupied",
+    "mug-dropped",
+    "pan-dirty",
+    "potato-in-pan",
+    "burner-occupied",
+    "bowl-filled-with-wine",
+    "knife-blocked",
+}
+
+OWN = """
+name = "fetch-ladle"
+title = "Fetch the ladle"
+plan = ["pick_up(Ladle)", "put_on(Ladle, DiningTable)"]
+
+[goal]
+text = "The ladle lies on the dining table."
+variables = { "?ladle" = "Ladle" }
+all = ["on_top_of(?ladle, DiningTable)"]
+
+[scene]
+clutter = [0, 2]
+
+[[scene.objects]]
+category = "Ladle"
+places = ["CounterTop"]
+
+[categories.Ladle]
+words = "ladle"
+pickupable = true
+attributes = ["dirty"]
+shape = { kind = "box", size_m = [0.28, 0.06, 0.04] }
+"""
+
+
+def test_the_shipped_files_are_all_there_and_load() -> None:
+    assert set(task_names()) == TASKS
+    assert set(scenario_names()) >= SCENARIOS
+    for name in scenario_names():
+        scenario = load_scenario(name)
+        assert scenario.task in TASKS
+        assert scenario.name == name
+    for name in task_names():
+        assert load_task(name).task.name == name
+
+
+def test_a_task_of_ones_own_with_an_object_of_ones_own(tmp_path: Path) -> None:
+    path = tmp_path / "fetch-ladle.toml"
+    path.write_text(OWN)
+    loaded = load_task(str(path))
+    assert loaded.vocabulary.accepts("CounterTop-1", "Ladle-1")
+    assert loaded.task.scene.objects[0].id == "Ladle-1"
+    assert str(loaded.task.goal.literals[0]) == "on_top_of(?ladle, DiningTable)"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "says"),
+    [
+        ("title =", "titel =", FileFormatError, "titel"),
+        ("pick_up(Ladle)", "grab(Ladle)", InputError, "unknown skill 'grab'"),
+        ("pick_up(Ladle)", "pick_up(Spoon)", InputError, "unknown object category 'Spoon'"),
+        ("clutter = [0, 2]", "clutter = [3, 2]", InputError, "least, most"),
+        ("on_top_of(?ladle", "on_top_of(?spoon", InputError, "goal variable"),
+        ("on_top_of(?ladle", "onto(?ladle", InputError, "unknown fact 'onto'"),
+        ('attributes = ["dirty"]', 'attributes = ["wet"]', InputError, "wet"),
+        ('places = ["CounterTop"]', 'places = ["Bench"]', InputError, "Bench"),
+        ("[goal]", "[goal", FileFormatError, "not valid TOML"),
+        ('name = "fetch-ladle"', 'name = "Fetch Ladle"', FileFormatError, "name"),
+    ],
+)
+def test_wrong_task_files(
+    tmp_path: Path, old: str, new: str, error: type[Exception], says: str
+) -> None:
+    assert old in OWN
+    path = tmp_path / "own.toml"
+    path.write_text(OWN.replace(old, new, 1))
+    with pytest.raises(error, match=says):
+        load_task(str(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('[[faults]]\nkind = "explode"\n', "faults"),
+        ('[[faults]]\nkind = "drop"\nstep = "navigate_to_obj(Mug)"\nwhere = 3\n', "where"),
+        ("faults = []\n", "faults"),
+    ],
+)
+def test_wrong_scenario_files(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "own.toml"
+    head = 'name = "own"\ntask = "make-coffee"\ntitle = "t"\nkind = "drop"\ncause = "c"\n'
+    path.write_text(head + text)
+    with pytest.raises(FileFormatError, match=says):
+        load_scenario(str(path))
+
+
+def test_unknown_names_come_with_near_ones(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="did you mean heat-potato"):
+        load_task("heat-potatoe")
+    with pytest.raises(UnknownNameError, match="did you mean mug-dropped"):
+        load_scenario("mug-droped")
+    with pytest.raises(FileFormatError, match="cannot read task file"):
+        load_task(str(tmp_path / "absent.toml"))
+
+
+def test_the_schemas_name_every_field() -> None:
+    both = schemas()
+    assert {"name", "plan", "goal", "scene", "categories"} <= set(both["task"]["properties"])
+    assert "faults" in both["scenario"]["properties"]

@@ -1,0 +1,200 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from forestall.perception.given import GivenStateEstimator
+from forestall.perception.perceiver import GraphPerceiver
+from forestall.perception.segmenters import InstanceSegmenter
+from forestall.types.graph import SceneGraph
+from forestall.vocabulary import household
+from .synthetic import Solid, at, hollow, looking, observed
+
+EYE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
+FLOOR_EYE = looking((0.0, -1.2, 1.5), (0.0, 0.0, 0.0))
+COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
+MUG = (0.085, 0.085, 0.10)
+
+
+def graph_of(solids, *poses, states=None, holding=None, hand=(0.0, -0.5, 1.2)) -> SceneGraph:
+    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator(states or {}), household())
+    return perceiver.perceive(observed(solids, *(poses or (EYE,)), holding=holding, hand=hand))
+
+
+def parents(graph: SceneGraph) -> dict[str, tuple[str, str]]:
+    return {
+        r.subject: (r.predicate, r.object)
+        for r in graph.relations
+        if r.predicate in ("inside", "on_top_of")
+    }
+
+
+def microwave(**kwargs) -> list[Solid]:
+    return hollow("Microwave-1", (-0.25, 0.2, 0.9), (0.25, 0.58, 1.2), 0.02, "front")
+
+
+CASES = {
+    "bowl in open microwave": (
+        [COUNTER, *microwave(), *hollow("Bowl-1", (-0.1, 0.3, 0.92), (0.1, 0.5, 1.0))],
+        {"Microwave-1": {"open": "open"}},
+        {"Bowl-1": ("inside", "Microwave-1")},
+    ),
+    "potato on plate on counter": (
+        [
+            COUNTER,
+            at("Plate-1", 0.1, 0.3, 0.9, (0.22, 0.22, 0.02), True),
+            at("Potato-1", 0.1, 0.3, 0.92, (0.1, 0.07, 0.065)),
+        ],
+        {},
+        {"Plate-1": ("on_top_of", "CounterTop-1"), "Potato-1": ("on_top_of", "Plate-1")},
+    ),
+    "pot covers its burner": (
+        [
+            COUNTER,
+            at("StoveBurner-1", -0.2, 0.3, 0.9, (0.24, 0.24, 0.01), True),
+            at("StoveBurner-2", 0.2, 0.3, 0.9, (0.24, 0.24, 0.01), True),
+            at("Pot-1", -0.2, 0.3, 0.91, (0.2, 0.2, 0.13), True),
+        ],
+        {},
+        {"Pot-1": ("on_top_of", "StoveBurner-1")},
+    ),
+    "egg in a pan": (
+        [
+            COUNTER,
+            *hollow("Pan-1", (-0.12, 0.2, 0.9), (0.12, 0.44, 0.95)),
+            at("EggCracked-1", 0.0, 0.32, 0.91, (0.11, 0.1, 0.02)),
+        ],
+        {},
+        {"EggCracked-1": ("inside", "Pan-1"), "Pan-1": ("on_top_of", "CounterTop-1")},
+    ),
+    "potato beside a pan, not in it": (
+        [
+            COUNTER,
+            *hollow("Pan-1", (-0.12, 0.2, 0.9), (0.12, 0.44, 0.95)),
+            at("Potato-1", 0.19, 0.32, 0.9, (0.1, 0.07, 0.065)),
+        ],
+        {},
+        {"Potato-1": ("on_top_of", "CounterTop-1"), "Pan-1": ("on_top_of", "CounterTop-1")},
+    ),
+    "egg in a bowl in an open fridge": (
+        [
+            *hollow("Fridge-1", (-0.35, 0.0, 0.0), (0.35, 0.65, 1.7), 0.03, "front"),
+            Solid("Fridge-1", (-0.35, 0.05, 0.9), (0.35, 0.65, 0.92)),
+            *hollow("Bowl-1", (-0.1, 0.2, 0.92), (0.1, 0.4, 1.005)),
+            at("Egg-1", 0.0, 0.3, 0.93, (0.045, 0.045, 0.058)),
+            at("Mug-1", -0.22, 0.3, 0.92, MUG, True),
+        ],
+        {"Fridge-1": {"open": "open"}},
+        {
+            "Bowl-1": ("inside", "Fridge-1"),
+            "Egg-1": ("inside", "Bowl-1"),
+            "Mug-1": ("inside", "Fridge-1"),
+        },
+    ),
+    "plate in the sink of a counter": (
+        [
+            Solid("CounterTop-1", (-1.0, 0.0, 0.86), (-0.25, 0.6, 0.9)),
+            Solid("CounterTop-1", (0.25, 0.0, 0.86), (1.0, 0.6, 0.9)),
+            Solid("CounterTop-1", (-0.25, 0.0, 0.86), (0.25, 0.1, 0.9)),
+            Solid("CounterTop-1", (-0.25, 0.5, 0.86), (0.25, 0.6, 0.9)),
+            *hollow("Sink-1", (-0.25, 0.1, 0.7), (0.25, 0.5, 0.89)),
+            at("Plate-1", 0.0, 0.3, 0.71, (0.22, 0.22, 0.02), True),
+            at("Mug-1", 0.32, 0.3, 0.9, MUG, True),
+        ],
+        {},
+        {"Plate-1": ("inside", "Sink-1"), "Mug-1": ("on_top_of", "CounterTop-1")},
+    ),
+    "mug beside a plate is not on it": (
+        [
+            COUNTER,
+            at("Plate-1", 0.0, 0.3, 0.9, (0.22, 0.22, 0.025), True),
+            at("Mug-1", 0.12, 0.4, 0.9, MUG, True),
+        ],
+        {},
+        {"Plate-1": ("on_top_of", "CounterTop-1"), "Mug-1": ("on_top_of", "CounterTop-1")},
+    ),
+    "mug on a closed microwave is in nothing": (
+        [
+            COUNTER,
+            Solid("Microwave-1", (-0.25, 0.2, 0.9), (0.25, 0.58, 1.2)),
+            at("Mug-1", 0.0, 0.3, 1.2, MUG, True),
+        ],
+        {"Microwave-1": {"open": "closed"}},
+        {},
+    ),
+    "mug on the floor": (
+        [
+            Solid("Floor-1", (-2.0, -2.0, -0.01), (2.0, 2.0, 0.0)),
+            at("Mug-1", 0.0, 0.0, 0.0, MUG, True),
+        ],
+        {},
+        {"Mug-1": ("on_top_of", "Floor-1")},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_thing_has_its_one_parent(name: str) -> None:
+    solids, states, expected = CASES[name]
+    pose = FLOOR_EYE if "floor" in name else EYE
+    assert parents(graph_of(solids, pose, states=states)) == expected
+
+
+def blocked(graph: SceneGraph) -> set[tuple[str, str]]:
+    return {(r.subject, r.object) for r in graph.relations if r.predicate == "blocking"}
+
+
+def test_pot_before_a_knife_blocks_it() -> None:
+    knife = at("Knife-1", 0.0, 0.45, 0.9, (0.3, 0.035, 0.02))
+    before = at("Pot-1", 0.0, 0.25, 0.9, (0.2, 0.2, 0.13), True)
+    assert ("Pot-1", "Knife-1") in blocked(graph_of([COUNTER, knife, before]))
+
+
+@pytest.mark.parametrize("x", [-0.45, 0.45])
+def test_pot_beside_a_knife_does_not_block_it(x: float) -> None:
+    knife = at("Knife-1", 0.0, 0.35, 0.9, (0.3, 0.035, 0.02))
+    beside = at("Pot-1", x, 0.35, 0.9, (0.2, 0.2, 0.13), True)
+    assert blocked(graph_of([COUNTER, knife, beside])) == set()
+
+
+def test_nothing_blocks_what_stands_before_it() -> None:
+    knife = at("Knife-1", 0.0, 0.45, 0.9, (0.3, 0.035, 0.02))
+    before = at("Pot-1", 0.0, 0.25, 0.9, (0.2, 0.2, 0.13), True)
+    assert ("Knife-1", "Pot-1") not in blocked(graph_of([COUNTER, knife, before]))
+
+
+def test_held_mug_is_held_and_rests_on_nothing() -> None:
+    mug = at("Mug-1", 0.0, -0.3, 1.2, MUG, True)
+    graph = graph_of([COUNTER, mug], holding="Mug-1", hand=(0.0, -0.3, 1.25))
+    assert graph.holding == "Mug-1"
+    assert graph.parents("Mug-1") == ()
+
+
+def test_directions_are_those_of_the_camera() -> None:
+    left = at("Mug-1", -0.15, 0.3, 0.9, MUG, True)
+    right = at("Mug-2", 0.15, 0.3, 0.9, MUG, True)
+    texts = {str(r) for r in graph_of([COUNTER, left, right]).relations}
+    assert "Mug-1 left of Mug-2" in texts
+    assert "Mug-2 right of Mug-1" in texts
+    other_side = looking((0.0, 1.8, 1.5), (0.0, 0.3, 0.9))
+    texts = {str(r) for r in graph_of([COUNTER, left, right], other_side).relations}
+    assert "Mug-1 right of Mug-2" in texts
+
+
+def test_front_is_towards_the_camera_and_near_needs_contact_distance() -> None:
+    front = at("Mug-1", 0.0, 0.1, 0.9, MUG, True)
+    back = at("Mug-2", 0.0, 0.27, 0.9, MUG, True)
+    texts = {str(r) for r in graph_of([COUNTER, front, back]).relations}
+    assert {"Mug-1 in front of Mug-2", "Mug-2 behind Mug-1", "Mug-1 near Mug-2"} <= texts
+    far = at("Mug-2", 0.0, 0.45, 0.9, MUG, True)
+    texts = {str(r) for r in graph_of([COUNTER, front, far]).relations}
+    assert "Mug-1 near Mug-2" not in texts
+
+
+def test_boxes_are_where_things_are() -> None:
+    graph = graph_of([COUNTER, at("Mug-1", 0.2, 0.3, 0.9, MUG)])
+    node = graph.get("Mug-1")
+    assert node is not None and node.box_m is not None
+    assert np.allclose(node.box_m.low, (0.1575, 0.2575, 0.9), atol=0.012)
+    assert np.allclose(node.box_m.high[0], 0.2425, atol=0.012)
+    assert np.allclose(node.box_m.high[2], 1.0, atol=0.012)

@@ -1,0 +1,151 @@
+"""The proactive strategy: when it goes on, looks again, replans, and stops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from forestall.strategies.proactive import Proactive
+from forestall.types.facts import Literal
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext
+from forestall.types.scene import SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Diagnosis,
+    PlanCheck,
+    Replan,
+    ReplanOutcome,
+    Verdict,
+)
+
+PLAN = Plan.parse(["pick_up(Plate)", "put_in(Plate, Microwave)", "close_obj(Microwave)"])
+OPEN = Literal.parse("open(Microwave-1)=open")
+REPAIRED = Plan((Subtask.parse("open_obj(Microwave-1)"), *PLAN.subtasks[1:]))
+
+
+class Parts:
+    """All collaborators in one scripted double that counts its calls."""
+
+    name = "scripted"
+
+    def __init__(
+        self,
+        decision: Decision,
+        must_change: tuple[Literal, ...] = (),
+        replan: Replan | None = None,
+        rest_runs: bool = True,
+    ) -> None:
+        self.decision = decision
+        self.must_change = must_change
+        self.answer = replan or Replan(ReplanOutcome.SOLVED, REPAIRED)
+        self.rest_runs = rest_runs
+        self.replanned = 0
+
+    def retrieve(self, subtask, task, done):  # type: ignore[no-untyped-def]
+        return []
+
+    def judge(self, observed, observation, references):  # type: ignore[no-untyped-def]
+        return Verdict(self.decision, "scripted", 0.5, 0.9, Calibration.FIXED)
+
+    def diagnose(self, context, verdict):  # type: ignore[no-untyped-def]
+        return Diagnosis("the microwave is closed", self.must_change)
+
+    def replan(self, context, diagnosis):  # type: ignore[no-untyped-def]
+        self.replanned += 1
+        return self.answer
+
+    def check(self, plan, graph, goal):  # type: ignore[no-untyped-def]
+        return PlanCheck(self.rest_runs, reason="the microwave is closed")
+
+
+def strategy(parts: Parts) -> Proactive:
+    return Proactive(parts, parts, parts, parts, parts)
+
+
+@pytest.fixture
+def context() -> BoundaryContext:
+    frame = Frame(
+        np.zeros((2, 2, 3), np.uint8),
+        np.ones((2, 2), np.float32),
+        Intrinsics.from_vertical_fov(2, 2, 60.0),
+        np.eye(4),
+    )
+    return BoundaryContext(
+        task=Task("heat", "Heat", Goal("hot"), PLAN, SceneNeeds()),
+        plan=PLAN,
+        index=1,
+        done=1,
+        subtask=PLAN.subtasks[1],
+        graph=SceneGraph(()),
+        scoped=SceneGraph(()),
+        observation=Observation((frame,), GripperState(None, (0.0, 0.0, 0.0)), 0.0),
+    )
+
+
+def test_a_scene_that_fits_goes_on_without_diagnosis(context: BoundaryContext) -> None:
+    parts = Parts(Decision.PROCEED)
+    answer = strategy(parts).before_subtask(context)
+    assert answer.decision is Decision.PROCEED
+    assert answer.diagnosis is None
+    assert parts.replanned == 0
+
+
+def test_an_alarm_with_nothing_to_change_is_recorded_and_goes_on(context: BoundaryContext) -> None:
+    parts = Parts(Decision.REPLAN)
+    answer = strategy(parts).before_subtask(context)
+    assert answer.decision is Decision.PROCEED
+    assert answer.verdict is not None and answer.verdict.decision is Decision.REPLAN
+    assert answer.replan is not None
+    assert answer.replan.outcome is ReplanOutcome.NOTHING_TO_CHANGE
+    assert parts.replanned == 0
+
+
+def test_an_alarm_with_a_cause_replans(context: BoundaryContext) -> None:
+    answer = strategy(Parts(Decision.REPLAN, (OPEN,))).before_subtask(context)
+    assert answer.decision is Decision.REPLAN
+    assert answer.replan is not None and answer.replan.plan == REPAIRED
+    assert dict(answer.seconds).keys() >= {"retrieve", "compare", "diagnose", "replan"}
+
+
+def test_what_is_being_repaired_does_not_alarm_again(context: BoundaryContext) -> None:
+    parts = Parts(Decision.REPLAN, (OPEN,))
+    proactive = strategy(parts)
+    proactive.before_subtask(context)
+    repairing = replace(context, plan=REPAIRED, index=0, replans=1)
+    assert proactive.before_subtask(repairing).decision is Decision.PROCEED
+    resumed = replace(context, plan=REPAIRED, index=1, replans=1)
+    assert proactive.before_subtask(resumed).decision is Decision.REPLAN
+
+
+def test_a_cause_whose_repair_does_not_help_is_left_alone(context: BoundaryContext) -> None:
+    parts = Parts(Decision.REPLAN, (OPEN,))
+    proactive = strategy(parts)
+    proactive.before_subtask(context)
+    resumed = replace(context, plan=REPAIRED, index=1, replans=1)
+    decisions = [proactive.before_subtask(resumed).decision for _ in range(4)]
+    assert decisions == [Decision.REPLAN] + [Decision.PROCEED] * 3
+    assert parts.replanned == 2
+
+
+def test_one_second_look_then_an_alarm(context: BoundaryContext) -> None:
+    proactive = strategy(Parts(Decision.LOOK_AGAIN, (OPEN,)))
+    assert proactive.before_subtask(context).decision is Decision.LOOK_AGAIN
+    again = proactive.before_subtask(replace(context, looks=2))
+    assert again.decision is Decision.REPLAN
+
+
+@pytest.mark.parametrize(("runs", "decision"), [(True, Decision.PROCEED), (False, Decision.STOP)])
+def test_without_a_repair_only_a_plan_that_checks_out_goes_on(
+    context: BoundaryContext, runs: bool, decision: Decision
+) -> None:
+    none = Replan(ReplanOutcome.UNSOLVABLE, note="the place of Mug-1 is not known")
+    proactive = strategy(Parts(Decision.REPLAN, (OPEN,), none, runs))
+    assert proactive.before_subtask(context).decision is Decision.LOOK_AGAIN
+    answer = proactive.before_subtask(replace(context, looks=2))
+    assert answer.decision is decision
+    assert answer.replan is none
