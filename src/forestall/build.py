@@ -109,6 +109,7 @@ def run_episode(
     prepared: Prepared,
     demonstrations: Sequence[Demonstration] | None,
     listeners: Sequence[Listener] = (),
+    memory: str | None = None,
 ) -> EpisodeRecord:
     """Build everything and run one episode.
 
@@ -116,6 +117,7 @@ def run_episode(
         prepared: from `prepare`.
         demonstrations: the memory; None only for a strategy that uses none.
         listeners: told what happens.
+        memory: where the demonstrations come from, for the record.
     """
     config, loaded, task = prepared.config, prepared.loaded, prepared.loaded.task
     needs = apply_scene_faults(task.scene, prepared.faults, loaded.vocabulary)
@@ -123,11 +125,11 @@ def run_episode(
     try:
         perceiver = GraphPerceiver(
             load("segmenter", config.segmenter)(),
-            _state_estimator(config.states, kitchen, loaded.vocabulary),
+            _state_estimator(config.states, kitchen),
             loaded.vocabulary,
         )
         runtime = Runtime(
-            wrap(kitchen, prepared.faults, kitchen),
+            wrap(kitchen, prepared.faults, kitchen, loaded.vocabulary),
             perceiver,
             make_strategy(config, loaded.vocabulary, demonstrations),
             loaded.vocabulary,
@@ -140,7 +142,7 @@ def run_episode(
             config.seed,
             None if prepared.scenario is None else prepared.scenario.name,
             _scorer(kitchen),
-            provenance(config),
+            (*provenance(config), ("memory", memory)),
         )
     finally:
         kitchen.close()
@@ -193,16 +195,16 @@ def provenance(config: RunConfig) -> tuple[tuple[str, Any], ...]:
     )
 
 
-def _state_estimator(name: str, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> Any:
+def _state_estimator(name: str, kitchen: KitchenEnvironment) -> Any:
     kind = load("states", name)
     if name == "oracle":
-        return kind(kitchen.oracle.states, vocabulary)
+        return kind(kitchen.oracle.states)
     if name == "given":
         raise InputError(
             f"states 'given' come with a stored observation; a run takes one of: "
             f"{', '.join(n for n in known('states') if n != 'given')}"
         )
-    return kind(vocabulary)
+    return kind()
 
 
 def _scorer(kitchen: KitchenEnvironment) -> Callable[[EpisodeRecord], EpisodeRecord]:

@@ -25,7 +25,7 @@ TABLES: dict[str, dict[str, str]] = {
     },
     "states": {
         "oracle": "forestall.perception.oracle:OracleStateEstimator",
-        "given": "forestall.perception.oracle:GivenStateEstimator",
+        "given": "forestall.perception.given:GivenStateEstimator",
     },
     "encoder": {
         "hashed-words": "forestall.embeddings.hashed:HashedTextEncoder",

@@ -73,7 +73,7 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
         rows.append(_row("RGB-D-and-ids frame", "ms", times, 300))
         perceiver = GraphPerceiver(
             InstanceSegmenter(),
-            OracleStateEstimator(kitchen.oracle.states, loaded.vocabulary),
+            OracleStateEstimator(kitchen.oracle.states),
             loaded.vocabulary,
         )
         perceiver.perceive(kitchen.scan())

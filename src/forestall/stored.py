@@ -16,7 +16,7 @@ from forestall.embeddings.hashed import HashedTextEncoder
 from forestall.grounding import ground_subtask
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.perception.folder import read_observation
-from forestall.perception.oracle import GivenStateEstimator
+from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks
 from forestall.types.demonstration import Demonstration

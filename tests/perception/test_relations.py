@@ -8,6 +8,7 @@ from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.types.graph import SceneGraph
 from forestall.vocabulary import household
+
 from .synthetic import Solid, at, hollow, looking, observed
 
 EYE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))

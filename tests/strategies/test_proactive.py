@@ -112,12 +112,28 @@ def test_an_alarm_with_a_cause_replans(context: BoundaryContext) -> None:
     assert dict(answer.seconds).keys() >= {"retrieve", "compare", "diagnose", "replan"}
 
 
-def test_what_is_being_repaired_does_not_alarm_again(context: BoundaryContext) -> None:
-    parts = Parts(Decision.REPLAN, (OPEN,))
+@pytest.mark.parametrize(
+    ("runs", "decision"), [(True, Decision.PROCEED), (False, Decision.LOOK_AGAIN)]
+)
+def test_steps_of_a_repair_are_checked_instead_of_compared(
+    context: BoundaryContext, runs: bool, decision: Decision
+) -> None:
+    parts = Parts(Decision.REPLAN, (OPEN,), rest_runs=runs)
     proactive = strategy(parts)
     proactive.before_subtask(context)
     repairing = replace(context, plan=REPAIRED, index=0, replans=1)
-    assert proactive.before_subtask(repairing).decision is Decision.PROCEED
+    answer = proactive.before_subtask(repairing)
+    assert answer.decision is decision
+    assert answer.verdict is not None and answer.verdict.detector == "plan check"
+    if not runs:
+        again = proactive.before_subtask(replace(repairing, looks=2))
+        assert again.diagnosis is not None
+        assert "the microwave is closed" in again.diagnosis.cause
+
+
+def test_after_the_repair_demonstrations_count_again(context: BoundaryContext) -> None:
+    proactive = strategy(Parts(Decision.REPLAN, (OPEN,)))
+    proactive.before_subtask(context)
     resumed = replace(context, plan=REPAIRED, index=1, replans=1)
     assert proactive.before_subtask(resumed).decision is Decision.REPLAN
 

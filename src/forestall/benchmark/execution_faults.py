@@ -20,13 +20,20 @@ class Activation(Protocol):
     """When an execution fault happens: at the n-th execution of a step, so many times."""
 
     @property
-    def kind(self) -> str: ...  # noqa: D102
+    def kind(self) -> str:
+        """What goes wrong."""
+
     @property
-    def step(self) -> str: ...  # noqa: D102
+    def step(self) -> str:
+        """The subtask concerned, as plans write it."""
+
     @property
-    def occurrence(self) -> int: ...  # noqa: D102
+    def occurrence(self) -> int:
+        """At which execution of the step it happens first, from 1."""
+
     @property
-    def times(self) -> int: ...  # noqa: D102
+    def times(self) -> int:
+        """How many times it happens at most."""
 
 
 class FaultyEnvironment:

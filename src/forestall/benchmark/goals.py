@@ -106,30 +106,32 @@ def _best(
     never: Sequence[Literal],
     history: _History,
 ) -> tuple[str, ...]:
-    """What fails under the binding with the fewest failures; empty where one binding fits."""
+    """What fails under the best binding; empty where one binding fits.
+
+    The best has the fewest failures and, among those, the fewest literals that do not hold: what
+    was reached and spoiled tells more than what was never tried.
+    """
     used = {a for literal in (*literals, *never) for a in literal.args}
     chosen = [(v, c) for v, c in variables if v in used]
     missing = tuple(f"there is no {c}" for _, c in chosen if not history.graph.of_category(c))
-    best: tuple[str, ...] | None = None
+    best: tuple[int, int, tuple[str, ...]] | None = None
     for binding in _bindings(chosen, history.graph):
-        failures = (
-            *missing,
-            *(
-                f"{ground} does not hold in the end{history.why(ground)}"
-                for ground in (literal.bind(binding) for literal in literals)
-                if not history.holds(ground)
-            ),
-            *(
-                f"{ground} must never be{history.cause(ground)}"
-                for ground in (literal.bind(binding) for literal in never)
-                if history.happened(ground)
-            ),
+        unmet = tuple(
+            f"{ground} does not hold in the end{history.why(ground)}"
+            for ground in (literal.bind(binding) for literal in literals)
+            if not history.holds(ground)
         )
-        if best is None or len(failures) < len(best):
-            best = failures
-        if not best:
+        wrong = tuple(
+            f"{ground} must never be{history.cause(ground)}"
+            for ground in (literal.bind(binding) for literal in never)
+            if history.happened(ground)
+        )
+        failures = (*missing, *unmet, *wrong)
+        if best is None or (len(failures), len(unmet)) < best[:2]:
+            best = (len(failures), len(unmet), failures)
+        if not failures:
             break
-    return best if best is not None else ("no binding of the goal's variables is possible",)
+    return ("no binding of the goal's variables is possible",) if best is None else best[2]
 
 
 def _bindings(

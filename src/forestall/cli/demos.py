@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
@@ -72,7 +72,7 @@ def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
         as_json: print JSON.
     """
     loaded, path = load_memory(memory, "oracle", False)
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"id": d.id, "task": d.task, "scene": d.scene, "steps": len(d.steps), **dict(d.perception)}
         for d in loaded
     ]

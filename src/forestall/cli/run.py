@@ -6,9 +6,13 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from forestall.interfaces import Listener
+    from forestall.types.demonstration import Demonstration
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 
@@ -43,21 +47,27 @@ def run(
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
     """
-    from forestall.build import RunConfig, prepare, run_episode
+    from forestall.build import RunConfig, prepare, provenance, run_episode
     from forestall.report.listeners import ProgressLine
     from forestall.report.page import write_page
-    from forestall.report.record import RunRecorder, record_json
+    from forestall.report.record import RECORD_NAME, RunRecorder, read_record
 
     config = RunConfig(task, scenario, strategy, seed, renderer, states=states, threshold=threshold)
     prepared = prepare(config)
     folder = out or _new_folder(prepared.loaded.task.name, scenario, strategy, seed)
     demonstrations, used = _memory(strategy, memory, states, quiet)
-    recorder = RunRecorder(folder)
-    listeners = [recorder] if quiet else [recorder, ProgressLine()]
-    record = run_episode(prepared, demonstrations, listeners)
-    page = write_page(record, folder / "index.html")
-    data = record_json(record, page=str(page), images=recorder.images)
-    data["memory"] = used
+    page = folder / "index.html"
+    recorder = RunRecorder(
+        folder,
+        scenario=None if prepared.scenario is None else prepared.scenario.name,
+        strategy=strategy,
+        provenance={**dict(provenance(config)), "memory": used},
+        page=str(page),
+    )
+    listeners: list[Listener] = [recorder] if quiet else [recorder, ProgressLine()]
+    record = run_episode(prepared, demonstrations, listeners, used)
+    write_page(record, page)
+    data = read_record(folder / RECORD_NAME)
     if as_json:
         print(json.dumps(data, indent=2))
     else:
@@ -67,7 +77,7 @@ def run(
 
 def _memory(
     strategy: str, memory: Path | None, states: str, quiet: bool
-) -> tuple[list[object] | None, str | None]:
+) -> tuple[list[Demonstration] | None, str | None]:
     if strategy == "none":
         return None, None
     from forestall.cli.demos import load_memory
@@ -81,7 +91,7 @@ def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Pa
     return Path("runs") / Path(name.replace("/", "_").replace(".toml", ""))
 
 
-def _summary(data: dict[str, object]) -> None:
+def _summary(data: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.markup import escape
 
@@ -92,18 +102,18 @@ def _summary(data: dict[str, object]) -> None:
         f"{escape(str(data['task']))} · {escape(str(data['scenario'] or 'undisturbed'))} · "
         f"{data['strategy']} · seed {data['seed']}"
     )
-    for failure in data["failures"]:  # type: ignore[attr-defined]
+    for failure in data["failures"]:
         console.print(f"  not reached: {escape(failure)}")
-    for alarm in data["alarms"]:  # type: ignore[attr-defined]
+    for alarm in data["alarms"]:
         score = "none" if alarm["score"] is None else f"{alarm['score']:.2f}"
         console.print(
             f"  alarm before {escape(alarm['subtask'])}: score {score} < "
             f"{alarm['threshold']:.2f}: {escape(alarm['cause'] or '')}"
         )
-    total = sum(data["compute_s"].values())  # type: ignore[attr-defined]
+    total = sum(data["compute_s"].values())
     console.print(
-        f"  {len(data['executed'])} subtasks, {data['replans']} replans, "  # type: ignore[arg-type]
+        f"  {len(data['executed'])} subtasks, {data['replans']} replans, "
         f"{data['simulated_s']:.0f} s of robot time, {total:.1f} s of computing; "
-        f"states: {escape(str(data['perception']['state_estimator']))}"  # type: ignore[index]
+        f"states: {escape(str(data['perception']['state_estimator']))}"
     )
     print(data["page"], file=sys.stdout)

@@ -7,6 +7,7 @@ the same, which makes that the only optimum.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -61,9 +62,7 @@ class BatchScorer:
         cache_size: how many prepared graphs are remembered.
     """
 
-    def __init__(
-        self, config: ScoreConfig, encoder: TextEncoder, cache_size: int = 8192
-    ) -> None:
+    def __init__(self, config: ScoreConfig, encoder: TextEncoder, cache_size: int = 8192) -> None:
         self.config = config
         self._encoder = encoder
         self._table = LabelTable(config, encoder)
@@ -80,7 +79,7 @@ class BatchScorer:
         result = self._batch(self._prepare(observed), self._stack(expected))
         columns = (result.score, result.node, result.edge, result.structure)
         return [
-            ScoreParts(score, *(None if v != v else v for v in rest))
+            ScoreParts(score, *(None if math.isnan(v) else v for v in rest))
             for score, *rest in zip(*(c.tolist() for c in columns), strict=True)
         ]
 
@@ -244,7 +243,8 @@ def _found_edges(observed: Prepared, stack: _Stack, partner: Ints, predicates: i
     first = np.arange(len(stack.graphs))[:, None] * predicates + observed.edges[:, 1]
     code = (first * size + np.maximum(subject, 0)) * size + np.maximum(target, 0)
     there: npt.NDArray[np.bool_] = stack.linked[code] & (subject >= 0) & (target >= 0)
-    return there.sum(axis=1)
+    found: Ints = there.sum(axis=1)
+    return found
 
 
 def _structure(
@@ -266,8 +266,10 @@ def _structure(
     gap = np.round(np.minimum(np.abs(ours - theirs) / scale, 1.0) / QUANTUM) * QUANTUM
     total = np.where(partner >= 0, gap, 0.0).sum(axis=1)
     if config.structure_count is StructureCount.UNION:
-        return 1.0 - (total + (union - matched)) / np.maximum(union, 1)
-    return np.where(matched > 0, 1.0 - total / np.maximum(matched, 1), 0.0)
+        whole: Floats = 1.0 - (total + (union - matched)) / np.maximum(union, 1)
+        return whole
+    result: Floats = np.where(matched > 0, 1.0 - total / np.maximum(matched, 1), 0.0)
+    return result
 
 
 def _mean(*columns: Floats) -> Floats:

@@ -191,9 +191,7 @@ def _extra_relations(
             continue
         there = _what_was_there(expected, r, target)
         found.append(
-            Discrepancy(
-                Change.EXTRA_RELATION, r.subject, there, str(r), f"{_sentence(r)}; {there}"
-            )
+            Discrepancy(Change.EXTRA_RELATION, r.subject, there, str(r), f"{_sentence(r)}; {there}")
         )
     return found
 
@@ -250,8 +248,7 @@ def _what_is_here(observed: SceneGraph, expected: Relation) -> tuple[str, str]:
     places = [
         str(r)
         for r in observed.relations
-        if r.subject == expected.subject
-        and r.predicate in ("inside", "on_top_of", "held_by")
+        if r.subject == expected.subject and r.predicate in ("inside", "on_top_of", "held_by")
     ]
     now = f" ({', '.join(places)})" if places else ""
     return (

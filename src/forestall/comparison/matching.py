@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from forestall.comparison.options import DegreeScale, EmptyRule, ScoreConfig, StructureCount
-from forestall.comparison.prepare import QUANTUM, Floats, Prepared, ties
+from forestall.comparison.prepare import QUANTUM, Floats, Ints, Prepared, ties
 from forestall.types.verdict import ScoreParts
 
 TIE_SPAN = 2.0**16
@@ -33,7 +33,7 @@ def weights(similarities: Floats, tie_values: Floats) -> Floats:
     return np.where(similarities > 0, weighted, 0.0)
 
 
-def assign(weight: Floats, observed: Prepared, expected: Prepared) -> tuple[Floats, Floats]:
+def assign(weight: Floats, observed: Prepared, expected: Prepared) -> tuple[Ints, Ints]:
     """Rows and columns of the best assignment.
 
     Equal optima are settled by solving from the side of the graph that comes first in a fixed
@@ -43,7 +43,7 @@ def assign(weight: Floats, observed: Prepared, expected: Prepared) -> tuple[Floa
         rows, columns = linear_sum_assignment(weight, maximize=True)
     else:
         columns, rows = linear_sum_assignment(weight.T, maximize=True)
-    return rows, columns
+    return rows.astype(np.int64), columns.astype(np.int64)
 
 
 def match(observed: Prepared, expected: Prepared, table: Floats) -> Matching:
@@ -114,9 +114,7 @@ def _structure(
     if union == 0:
         return _zero_by_zero(config)
     matched = len(matching.pairs) + (matching.subtask is not None)
-    largest = max(
-        1, int(observed.degree.max(initial=0)), int(expected.degree.max(initial=0))
-    )
+    largest = max(1, int(observed.degree.max(initial=0)), int(expected.degree.max(initial=0)))
     nodes = max(1, max(len(observed.names), len(expected.names)) - 1)
     total = 0.0
     for i, j in matching.pairs:

@@ -167,7 +167,11 @@ def prepare(graph: SceneGraph, config: ScoreConfig, table: LabelTable) -> Prepar
     labels = [_label(groups[k][0], config, roles) for k in keys]
     edges = sorted(
         {
-            (position[place[r.subject]], config.predicates.index(r.predicate), position[place[r.object]])
+            (
+                position[place[r.subject]],
+                config.predicates.index(r.predicate),
+                position[place[r.object]],
+            )
             for r in graph.relations
             if r.predicate in config.predicates and place[r.subject] != place[r.object]
         }

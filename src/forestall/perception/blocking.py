@@ -64,13 +64,16 @@ def blocking(
     """
     found = []
     robot = np.asarray(robot_position_world_m[:2])
+    gap = stack.gaps_m()
     index = {t.id: i for i, t in enumerate(stack.things)}
     members = [i for i in sorted(parents) if i in index]
     for target in members:
         for other in members:
+            a, b = index[target], index[other]
             if other == target or parents[other] != parents[target]:
                 continue
-            a, b = index[target], index[other]
+            if gap[a, b] > config.corridor_m:
+                continue
             if _between(stack, a, b, robot, config) or (
                 cut_share.get((other, target), 0.0) >= config.occlusion_share
                 and _in_front(stack, a, b, robot, config)

@@ -18,6 +18,8 @@ class PerceptionConfig:
     Args:
         min_pixels: masks under this are ignored (REFLECT drops tiny detections likewise).
         max_points: pixels of one mask that are unprojected; larger masks are thinned on a lattice.
+        max_stride: widest stride of that lattice (a power of two); at 640 × 480 and 2 m a stride
+            of 4 is 2 cm, so that enough of a floor is left around a mug that lies on it.
         voxel_m: edge of the thinning grid for movable things.
         fixture_voxel_m: the same for furniture, which is large.
         min_cell_support: pixels in a 4-voxel cell and its six neighbours below which the cell is
@@ -64,6 +66,7 @@ class PerceptionConfig:
 
     min_pixels: int = 20
     max_points: int = 4000
+    max_stride: int = 4
     voxel_m: float = 0.008
     fixture_voxel_m: float = 0.02
     min_cell_support: int = 4
@@ -95,7 +98,7 @@ class PerceptionConfig:
     free_margin_share: float = 0.01
     gone_share: float = 0.5
     expected_pixels: float = 4.0
-    interior_share: float = 0.3
+    interior_share: float = 0.2
     same_place_m: float = 0.3
 
 

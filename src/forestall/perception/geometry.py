@@ -45,14 +45,12 @@ class Thing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stack:
-    """Arrays over all things: boxes (n, 3), footprints (n, 16), clouds and samples of them."""
+    """Arrays over all things: boxes (n, 3), footprints (n, 16) and samples of clouds."""
 
     things: tuple[Thing, ...]
     low_m: Points
     high_m: Points
     footprint_m: Points
-    cloud_m: Points
-    owner: npt.NDArray[np.int64]
     samples: tuple[Points, ...]
 
     @classmethod
@@ -61,7 +59,7 @@ class Stack:
         ordered = tuple(sorted(things, key=lambda t: t.id))
         if not ordered:
             empty = np.zeros((0, 3))
-            return cls((), empty, empty, np.zeros((0, 16)), empty, np.zeros(0, np.int64), ())
+            return cls((), empty, empty, np.zeros((0, 16)), ())
         counts = [len(t.points_world_m) for t in ordered]
         cloud = np.concatenate([t.points_world_m for t in ordered])
         starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -71,16 +69,14 @@ class Stack:
             low_m=np.stack([t.low_m for t in ordered]),
             high_m=np.stack([t.high_m for t in ordered]),
             footprint_m=reach,
-            cloud_m=cloud,
-            owner=np.repeat(np.arange(len(ordered)), counts),
             samples=tuple(sampled(t.points_world_m) for t in ordered),
         )
 
-    def over(self, points_m: Points, slack_m: float) -> npt.NDArray[np.bool_]:
-        """(n, things) whether each point lies above or below each footprint."""
+    def over(self, points_m: Points, which: Sequence[int], slack_m: float) -> npt.NDArray[np.bool_]:
+        """(n, len(which)) whether each point lies above or below each footprint."""
         reach = points_m[:, :2] @ DIRECTIONS
         within: npt.NDArray[np.bool_] = np.all(
-            reach[:, None, :] <= self.footprint_m[None, :, :] + slack_m, axis=2
+            reach[:, None, :] <= self.footprint_m[None, list(which), :] + slack_m, axis=2
         )
         return within
 

@@ -73,6 +73,5 @@ def _assigned(
     distance = np.linalg.norm(here[:, None, :] - there[None, :, :], axis=2)
     cost = np.where(distance <= reach_m, distance, _NEVER)
     rows, columns = linear_sum_assignment(cost)
-    return {
-        located[r]: options[c] for r, c in zip(rows, columns, strict=True) if cost[r, c] < _NEVER
-    }
+    pairs = [(int(r), int(c)) for r, c in zip(rows, columns, strict=True)]
+    return {located[r]: options[c] for r, c in pairs if cost[r, c] < _NEVER}

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import numpy.typing as npt
 
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import DIRECTIONS, Stack
@@ -54,21 +53,24 @@ def _parent(
     if not candidates:
         return None
     own = stack.samples[a]
-    share = stack.over(own, config.footprint_slack_m).mean(axis=0)
-    contacts = _contacts(stack, a, vocabulary, config)
+    over = stack.over(own, candidates, config.footprint_slack_m)
+    share = dict(zip(candidates, over.mean(axis=0).tolist(), strict=True))
+    bottom = _bottom_m(stack, a, vocabulary)
     area = np.prod(stack.high_m[:, :2] - stack.low_m[:, :2], axis=1)
     holding: list[tuple[float, str, int]] = []
     touching: list[tuple[float, str, int]] = []
     for r in candidates:
         predicate = _relation(vocabulary, stack.things[r].category)
         if predicate == "inside":
-            if _inside(stack, a, r, float(share[r]), vocabulary, config):
+            if _inside(stack, a, r, share[r], vocabulary, config):
                 holding.append((float(area[r]), predicate, r))
-        elif contacts[r] >= config.min_contacts:
+            continue
+        contacts = _contacts(stack, a, r, bottom, config)
+        if contacts >= config.min_contacts:
             if share[r] >= config.on_top_share or _covers(stack, a, r, config):
                 holding.append((float(area[r]), predicate, r))
             else:
-                touching.append((-float(contacts[r]), predicate, r))
+                touching.append((-float(contacts), predicate, r))
     if not holding and not touching:
         return None
     _, predicate, r = min(holding or touching)
@@ -102,19 +104,19 @@ def _bottom_m(stack: Stack, a: int, vocabulary: Vocabulary) -> float:
     return low if size is None else min(low, high - float(size[2]))
 
 
-def _contacts(
-    stack: Stack, a: int, vocabulary: Vocabulary, config: PerceptionConfig
-) -> npt.NDArray[np.int64]:
-    """For each thing, how many of its points lie at the height of a's foot, below or around it."""
+def _contacts(stack: Stack, a: int, r: int, bottom_m: float, config: PerceptionConfig) -> int:
+    """How many points of `r` lie at the height of a's foot, below or around it."""
     low, high = stack.low_m[a], stack.high_m[a]
-    p = stack.cloud_m
+    p = stack.things[r].points_world_m
+    level = p[
+        (p[:, 2] >= bottom_m - config.contact_below_m)
+        & (p[:, 2] <= low[2] + config.contact_above_m)
+    ]
     beside = np.all(
-        (p[:, :2] >= low[:2] - config.ring_m) & (p[:, :2] <= high[:2] + config.ring_m), axis=1
+        (level[:, :2] >= low[:2] - config.ring_m) & (level[:, :2] <= high[:2] + config.ring_m),
+        axis=1,
     )
-    level = (p[:, 2] >= _bottom_m(stack, a, vocabulary) - config.contact_below_m) & (
-        p[:, 2] <= low[2] + config.contact_above_m
-    )
-    return np.bincount(stack.owner[beside & level], minlength=len(stack.things))
+    return int(np.count_nonzero(beside))
 
 
 def _covers(stack: Stack, a: int, r: int, config: PerceptionConfig) -> bool:

@@ -103,10 +103,10 @@ def clouds(
     boxes = _image_boxes(labels, count)
     if count == 0:
         return []
-    low_bits = _low_bits(pixels, config.max_points)
+    low_bits = _low_bits(pixels, config)
     index, owner = _sampled_pixels(frame, flat, low_bits)
     points = _to_world(frame, index)
-    worth = (low_bits + 1.0) ** 2
+    worth = np.square(low_bits + 1, dtype=np.float64)
     owner, points, weights = _thin(points, owner, np.asarray(voxel_m), worth, config)
     starts = np.searchsorted(owner, np.arange(count + 1))
     result: list[Cloud | None] = []
@@ -146,10 +146,11 @@ def _image_boxes(labels: Labels, count: int) -> list[tuple[int, int, int, int]]:
     return boxes
 
 
-def _low_bits(pixels: npt.NDArray[np.int64], max_points: int) -> npt.NDArray[np.int64]:
+def _low_bits(pixels: npt.NDArray[np.int64], config: PerceptionConfig) -> npt.NDArray[np.int64]:
     """For each mask, stride of its lattice minus one; strides are powers of two."""
-    stride = np.sqrt(np.maximum(pixels / max_points, 1.0))
-    bits: npt.NDArray[np.int64] = np.left_shift(1, np.ceil(np.log2(stride)).astype(np.int64)) - 1
+    stride = np.sqrt(np.maximum(pixels / config.max_points, 1.0))
+    wanted = np.left_shift(1, np.ceil(np.log2(stride)).astype(np.int64))
+    bits: npt.NDArray[np.int64] = np.minimum(wanted, config.max_stride) - 1
     return bits
 
 

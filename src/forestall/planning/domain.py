@@ -60,7 +60,7 @@ def resolve(state: State, subtask: Subtask) -> tuple[str, ...] | Refusal:
 
 def products(state: State, category: str, count: int) -> tuple[str, ...]:
     """Names of things that slicing or cracking makes: the lowest numbers that are free."""
-    names = []
+    names: list[str] = []
     number = 1
     while len(names) < count:
         if f"{category}-{number}" not in state.kinds:
@@ -231,12 +231,12 @@ def _toggle_on(state: State, name: str) -> None:
         raise _RefusedError(
             f"{thing} is open and cannot be turned on", Literal("open", (thing,), "closed")
         )
-    if device and device.needs_held:
-        if state.held is None or state.kinds[state.held] != device.needs_held:
-            raise _RefusedError(
-                f"{thing} is turned on with the {device.needs_held}, which is not in the gripper",
-                Literal("held_by", (device.needs_held, GRIPPER)),
-            )
+    held = None if state.held is None else state.kinds[state.held]
+    if device and device.needs_held and held != device.needs_held:
+        raise _RefusedError(
+            f"{thing} is turned on with the {device.needs_held}, which is not in the gripper",
+            Literal("held_by", (device.needs_held, GRIPPER)),
+        )
     set_value(state, thing, "toggled", "on")
     state.at = name
 

@@ -37,9 +37,7 @@ class Layout:
         goals: ground alternatives; what they speak of is tracked.
     """
 
-    def __init__(
-        self, state: State, universe: Universe, goals: Sequence[Conjunction]
-    ) -> None:
+    def __init__(self, state: State, universe: Universe, goals: Sequence[Conjunction]) -> None:
         self.state = state
         self.universe = universe
         literals = [x for goal in goals for x in goal]
@@ -48,6 +46,11 @@ class Layout:
         self.watched |= {s for s, made in universe.made.items() if self.watched & set(made)}
         made = [y for names in universe.made.values() for y in names]
         self._made = set(made)
+        self._quiet: dict[str, list[str]] = {}
+        for x in universe.things:
+            if state.value(x, "toggled") == "off":
+                for target in state.targets(x):
+                    self._quiet.setdefault(target, []).append(x)
         self.movable = sorted(
             [x for x in universe.things if self._movable(x)] + made, key=by_number
         )
@@ -123,14 +126,25 @@ class Layout:
             here: Atom = ("free", receptacle, str(k))
             yield [here], [here], [("free", receptacle, str(k - 1))]
 
+    def quiet(self, receptacle: str | None) -> list[Atom]:
+        """The condition that nothing runs where a hand goes, for devices that were off at first.
+
+        Plans then put a thing in, turn on, turn off and take it out, as people do, and leave no
+        water running. Nothing is lost by it: whatever is on can be turned off.
+        """
+        return [("is", d, "toggled", "off") for d in self._quiet.get(receptacle or "", ())]
+
     def plain(self, name: str) -> bool:
         """A support or basin without limit, lid and device: what lies there is left alone."""
         category = self.category(name)
         busy = any(
             name in self.state.targets(d) for d in self.state.kinds if self.state.category(d).device
         )
-        return category.fixture and name not in self.capacity and not busy and not (
-            self.state.vocabulary.encloses(name)
+        return (
+            category.fixture
+            and name not in self.capacity
+            and not busy
+            and not (self.state.vocabulary.encloses(name))
         )
 
     def behind(self, name: str) -> list[str]:
@@ -249,4 +263,3 @@ class Layout:
         elif name != self.state.held:
             places.append(self._first_place(name))
         return list(dict.fromkeys(places))
-

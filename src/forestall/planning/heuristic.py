@@ -63,7 +63,5 @@ class RelaxedPlan:
             condition, index, _ = supporter[bit]
             chosen.add(index)
             open_atoms |= condition & ~state & ~closed
-        helpful = tuple(
-            i for i in sorted(chosen) if self.operators[i].condition & ~state == 0
-        )
+        helpful = tuple(i for i in sorted(chosen) if self.operators[i].condition & ~state == 0)
         return len(chosen), helpful

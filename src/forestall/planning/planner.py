@@ -49,8 +49,9 @@ def plan_to(
     start_s = time.perf_counter()
     if not goals:
         return Planned(ReplanOutcome.UNSOLVABLE, note="nothing that is known can meet the goal")
+    kept = universe(state, goals, also)
     try:
-        problem = pose(state, goals, also)
+        problem = translate(state, goals, kept)
     except UnsupportedError as error:
         return Planned(ReplanOutcome.UNSUPPORTED, note=str(error))
     found = solve(problem, config)
@@ -58,10 +59,10 @@ def plan_to(
     subtasks: tuple[Subtask, ...] = ()
     final, note = None, ""
     if outcome is ReplanOutcome.SOLVED:
-        manipulations = [problem.operators[i] for i in found.steps]
-        subtasks, final, note = _with_driving(
-            state, [(o.subtask, _cracked_into(problem, o.effects[0].add)) for o in manipulations]
-        )
+        named = {a for goal in goals for x in goal for a in x.args}
+        loose = frozenset(x for x in kept.supports if x not in named)
+        steps = [problem.operators[i] for i in found.steps]
+        subtasks, final, note = _with_driving(state, [(o.subtask, o.over) for o in steps], loose)
         if final is None:
             outcome = ReplanOutcome.REJECTED
     elif outcome is ReplanOutcome.UNSOLVABLE:
@@ -91,29 +92,27 @@ def pose(state: State, goals: Sequence[Conjunction], also: Iterable[str] = ()) -
     return translate(state, goals, universe(state, goals, also))
 
 
-def _cracked_into(problem: Problem, add: int) -> str | None:
-    return next((a[3] for a in problem.names(add) if a[0] == "at"), None)
-
-
 def _with_driving(
-    state: State, steps: Sequence[tuple[Subtask, str | None]]
+    state: State, steps: Sequence[tuple[Subtask, str | None]], loose: frozenset[str]
 ) -> tuple[tuple[Subtask, ...], State | None, str]:
-    """Insert navigation, executing along; the final state is None if a step does not run."""
+    """Insert navigation, executing along; the final state is None if a step does not run.
+
+    A support in `loose` is named by its category: any other of its kind with room would do.
+    """
     plan: list[Subtask] = []
     where: str | None = None
-    for subtask, goes_to in steps:
-        subject = subtask.args[-1]
-        crack = subtask.skill == "crack_obj"
-        if crack and goes_to is not None:
-            subject = goes_to
+    for subtask, over in steps:
+        subject = over or subtask.args[-1]
         place = state.root(subject)
         device = state.category(subject).device
         if device is not None and device.acts_on is not None and state.targets(subject):
             place = state.targets(subject)[0]
         steps_here = [subtask]
-        if (place != where or crack) and subject != state.held:
+        if (place != where or over) and subject != state.held:
             steps_here.insert(0, Subtask("navigate_to_obj", (_landmark(state, subject),)))
         where = place
+        if place in loose and place == subject and state.instances(state.kinds[place])[0] == place:
+            steps_here = [_renamed(s, place, state.kinds[place]) for s in steps_here]
         for step in steps_here:
             after = apply(state, step)
             if isinstance(after, Refusal):
@@ -123,12 +122,16 @@ def _with_driving(
     return tuple(plan), state, ""
 
 
+def _renamed(subtask: Subtask, old: str, new: str) -> Subtask:
+    return Subtask(subtask.skill, tuple(new if a == old else a for a in subtask.args))
+
+
 def _landmark(state: State, name: str) -> str:
     """What to drive to for a thing: the container that it is inside, else itself."""
     for place in state.chain(name):
-        if state.vocabulary.encloses(place.parent) or place.parent == state.root(name):
-            if place.relation == "inside":
-                return place.parent
+        fixture = place.parent == state.root(name) or state.vocabulary.encloses(place.parent)
+        if fixture and place.relation == "inside":
+            return place.parent
     return name
 
 
@@ -145,7 +148,5 @@ def _why_not(state: State, goals: Sequence[Conjunction]) -> str:
     lost = sorted({a for goal in goals for x in goal for a in x.args if a in state.lost})
     if lost:
         return f"{', '.join(lost)}: its place is not known"
-    facts = [
-        x for x in goals[0] if not x.predicate.startswith("not ") and not state.holds(x)
-    ]
+    facts = [x for x in goals[0] if not x.predicate.startswith("not ") and not state.holds(x)]
     return "no sequence of skills leads to " + ", ".join(map(str, facts or goals[0]))

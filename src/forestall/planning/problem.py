@@ -27,12 +27,14 @@ class Effect:
 class Operator:
     """One ground skill: runs where `condition` holds; every effect is judged on the state before.
 
-    The first effect is the unconditional one.
+    The first effect is the unconditional one. `over` is the vessel that an egg is cracked over,
+    which the subtask itself does not name.
     """
 
     subtask: Subtask
     condition: int
     effects: tuple[Effect, ...]
+    over: str | None = None
 
     def apply(self, state: int) -> int:
         """The state after the operator, which must be applicable."""

@@ -51,7 +51,7 @@ def alternatives(state: State, goal: Goal) -> tuple[Conjunction, ...]:
     literals = list(goal.literals) + [negated(x) for x in goal.never]
     variables = list(goal.variables)
     ground: list[Literal] = []
-    for literal in literals:
+    for literal in (y for x in literals for y in _for_all(state, x)):
         args = []
         for position, arg in enumerate(literal.args):
             if arg == GRIPPER or arg.startswith("?") or is_instance(arg):
@@ -62,6 +62,20 @@ def alternatives(state: State, goal: Goal) -> tuple[Conjunction, ...]:
                 args.append(variable)
         ground.append(Literal(literal.predicate, tuple(args), literal.value))
     return tuple(islice(_bound(state, variables, ground), MAX_ALTERNATIVES))
+
+
+def _for_all(state: State, literal: Literal) -> Iterator[Literal]:
+    """A negative literal about a category is one about each of its instances."""
+    if literal.value != "false" and not literal.predicate.startswith("not "):
+        yield literal
+        return
+    choices = [
+        (a,) if a == GRIPPER or a.startswith("?") or is_instance(a) else possible(state, canonical)
+        for a in literal.args
+        for canonical in (state.vocabulary.canonical(a),)
+    ]
+    for args in product(*choices):
+        yield Literal(literal.predicate, args, literal.value)
 
 
 def negated(literal: Literal) -> Literal:
@@ -124,7 +138,7 @@ def _source_of(state: State, category: str) -> str | None:
         and x not in state.spoiled
     ]
     best = [x for x in sources if x == state.held or state.closed_around(x) is None]
-    return (best or sources or [None])[0]
+    return next(iter(best or sources), None)
 
 
 @dataclass
@@ -164,6 +178,8 @@ class _Closure:
     def want(self, literal: Literal) -> None:
         """Keep what can bring a literal about."""
         state = self.state
+        if literal.predicate == "spoiled":
+            return
         for arg in literal.args:
             if arg != GRIPPER and not arg.startswith("?"):
                 self.use((arg,))

@@ -250,9 +250,9 @@ def _places(graph: SceneGraph, state: State) -> dict[str, Place]:
     """One place for each thing: inside before on top, the innermost of several, no cycles."""
     edges: dict[str, list[Place]] = {}
     for r in graph.relations:
-        if r.predicate in ("inside", "on_top_of") and r.subject in state.kinds:
-            if r.object in state.kinds and r.subject != state.held:
-                edges.setdefault(r.subject, []).append(Place(r.predicate, r.object))
+        known = r.subject in state.kinds and r.object in state.kinds and r.subject != state.held
+        if known and r.predicate in ("inside", "on_top_of"):
+            edges.setdefault(r.subject, []).append(Place(r.predicate, r.object))
     places: dict[str, Place] = {}
     for name in sorted(edges, key=by_number):
         if state.category(name).fixture:

@@ -38,6 +38,7 @@ class Draft:
     add: Sequence[Atom]
     delete: Sequence[Atom]
     changes: list[Change] = field(default_factory=list)
+    over: str | None = None
 
 
 def translate(state: State, goals: Sequence[Conjunction], universe: Universe) -> Problem:
@@ -88,7 +89,7 @@ def _pick_up(layout: Layout, x: str, place: Atom) -> Draft:
     behind = [("clear", x, z) for z in layout.behind(x)]
     draft = Draft(
         Subtask("pick_up", (x,)),
-        [place, ("reach", x), ("hand_empty",), *blockers],
+        [place, ("reach", x), ("hand_empty",), *blockers, *layout.quiet(layout.parent(place))],
         [("held", x), *behind],
         [place, ("hand_empty",)],
     )
@@ -96,8 +97,11 @@ def _pick_up(layout: Layout, x: str, place: Atom) -> Draft:
     if parent is not None and layout.counted(place):
         for k in range(layout.capacity[parent]):
             draft.changes.append(
-                Change((("free", parent, str(k)),), (("free", parent, str(k + 1)),),
-                       (("free", parent, str(k)),))
+                Change(
+                    (("free", parent, str(k)),),
+                    (("free", parent, str(k + 1)),),
+                    (("free", parent, str(k)),),
+                )
             )
     return draft
 
@@ -106,6 +110,7 @@ def _put(layout: Layout, effects: Automatic, x: str, receptacle: str) -> Iterato
     place = layout.place(x, receptacle)
     skill = "put_in" if place[2] == "inside" else "put_on"
     condition: list[Atom] = [("held", x), *layout.reachable(receptacle)]
+    condition += layout.quiet(receptacle)
     if layout.state.vocabulary.encloses(receptacle):
         condition.append(("is", receptacle, "open", "open"))
     changes = effects.arrival(x, receptacle)
@@ -166,7 +171,7 @@ def _slice(layout: Layout, x: str) -> Iterator[Draft]:
                 Subtask("slice_obj", (x,)),
                 [("held", knife), place, ("reach", x)],
                 [
-                    *(("loose", y) if parent is None else (*place[:1], y, *place[2:]) for y in made),
+                    *(("loose", y) if parent is None else ("at", y, *place[2:]) for y in made),
                     *(("clear", x, z) for z in layout.behind(x)),
                 ],
                 [place],
@@ -184,6 +189,7 @@ def _crack(layout: Layout, effects: Automatic, x: str) -> Iterator[Draft]:
                 [layout.place(y, vessel), ("hand_empty",), *left],
                 [("held", x), *taken],
                 [*layout.inherits(x, y), *effects.arrival(y, vessel)],
+                over=vessel,
             )
 
 
@@ -217,7 +223,9 @@ def _goal_atoms(layout: Layout, literal: Literal) -> list[Atom]:
         return [("not", "is", args[0], predicate.removeprefix("not "), literal.value)]
     if predicate == "vacant" and yes:
         return [
-            ("not", *place) for x in layout.movable for place in layout.places[x]
+            ("not", *place)
+            for x in layout.movable
+            for place in layout.places[x]
             if layout.parent(place) == args[0]
         ]
     if predicate == "unblocked" and yes:
@@ -272,7 +280,7 @@ def _number(layout: Layout, drafts: list[Draft], goals: list[list[Atom]]) -> Pro
         first, *others = (effect(c) for c in _all_changes(d))
         effects = (first, *(e for e in others if e.add or e.delete))
         if any(e.add or e.delete for e in effects):
-            operators.append(Operator(d.subtask, mask(d.condition), effects))
+            operators.append(Operator(d.subtask, mask(d.condition), effects, d.over))
     start = mask(initial) | mask(("not", *a) for a in complements if a not in initial)
     return Problem(tuple(atoms), start, tuple(mask(g) for g in goals), tuple(operators))
 

@@ -68,7 +68,8 @@ def observed(graph: SceneGraph, vocabulary: Vocabulary) -> State:
 
 def run(state: State, subtasks: Iterable[Subtask]) -> Trace:
     """Execute subtasks one after the other until one is refused."""
-    states, touched = [state], set()
+    states: list[State] = [state]
+    touched: set[str] = set()
     for step, subtask in enumerate(subtasks):
         after = apply(states[-1], subtask)
         if isinstance(after, Refusal):
@@ -90,9 +91,7 @@ def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
     best: tuple[Literal, ...] | None = None
     for binding in bindings(final, goal):
         missing = tuple(g for x in goal.literals if not final.holds(g := x.bind(binding)))
-        never = tuple(
-            g for x in goal.never if any(s.holds(g := x.bind(binding)) for s in states)
-        )
+        never = tuple(g for x in goal.never if any(s.holds(g := x.bind(binding)) for s in states))
         if not missing and not never:
             return ()
         if best is None or len(missing) + len(never) < len(best):
@@ -120,9 +119,7 @@ def _relied_on(trace: Trace, goal: Goal) -> tuple[Literal, ...]:
     """Assumed facts about what the plan handles or the goal asks for."""
     final = trace.final
     wanted = {m for x in goal.literals for a in x.args for m in final.matches(a)}
-    wanted |= {
-        m for _, c in goal.variables for m in final.matches(c) if len(final.matches(c)) == 1
-    }
+    wanted |= {m for _, c in goal.variables for m in final.matches(c) if len(final.matches(c)) == 1}
     concerned = trace.touched | wanted
     facts = {f for s in (trace.states[0], final) for f in s.assumed}
     return tuple(sorted(f for f in facts if f.args and f.args[0] in concerned))

@@ -14,7 +14,14 @@ from forestall.types.episode import SkillOutcome
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
-from forestall.types.verdict import Decision, Diagnosis, Replan, ReplanOutcome, Verdict
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Diagnosis,
+    Replan,
+    ReplanOutcome,
+    Verdict,
+)
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
 
@@ -38,10 +45,13 @@ class _Clock:
 class Proactive:
     """Judges each subtask before it starts.
 
-    Within a repair the facts that the repair is about to restore do not alarm again. A cause whose
-    repair did not help after `max_attempts` attempts is left alone, so that a run cannot turn in
-    circles. When a fact must change, no plan changes it, and the plan at hand does not check out
-    either, the run stops safely.
+    Subtasks of the nominal plan are compared with demonstrations of the same point. The steps of a
+    repair have no such point: there the rest of the plan is checked on what is seen, by the same
+    validator that accepted the repair, and an alarm is raised when it would no longer run.
+
+    A cause whose repair did not help after `max_attempts` attempts is left alone, so that a run
+    cannot turn in circles. When a fact must change, no plan changes it, and the plan at hand does
+    not check out either, the run stops safely.
     """
 
     name = "proactive"
@@ -61,20 +71,18 @@ class Proactive:
         self._replanner = replanner
         self._validator = validator
         self._max_attempts = max_attempts
-        self._pending: frozenset[Literal] = frozenset()
-        self._resume_left = -1
+        self._resume_left = 0
         self._attempts: dict[tuple[Literal, ...], int] = {}
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Retrieve, compare; on an alarm diagnose and replan."""
-        left = len(context.plan) - context.index
         if context.replans == 0:
-            self._pending, self._resume_left = frozenset(), -1
-            if left == len(context.plan):
+            self._resume_left = len(context.plan)
+            if context.index == 0:
                 self._attempts.clear()
-        elif left <= self._resume_left:
-            self._pending = frozenset()
         clock = _Clock()
+        if len(context.plan) - context.index > self._resume_left:
+            return self._repairing(context, clock)
         references = tuple(
             self._retriever.retrieve(context.subtask, context.task.name, context.done)
         )
@@ -87,11 +95,43 @@ class Proactive:
         if verdict.decision is Decision.PROCEED:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
         verdict = replace(verdict, decision=Decision.REPLAN)
-        return self._alarm(context, verdict, clock)
-
-    def _alarm(self, context: BoundaryContext, verdict: Verdict, clock: _Clock) -> StrategyAnswer:
-        diagnosis = self._without_pending(self._reasoner.diagnose(context, verdict))
+        diagnosis = self._reasoner.diagnose(context, verdict)
         clock.lap("diagnose")
+        return self._alarm(context, verdict, diagnosis, clock)
+
+    def _repairing(self, context: BoundaryContext, clock: _Clock) -> StrategyAnswer:
+        """Inside a repair: does what is left of the plan still run from what is seen?"""
+        rest = Plan(context.remaining(), context.plan.goal)
+        check = self._validator.check(rest, context.graph, context.task.goal)
+        clock.lap("validate")
+        verdict = Verdict(
+            Decision.PROCEED if check.ok else Decision.REPLAN,
+            "plan check",
+            score=None,
+            threshold=0.0,
+            calibration=Calibration.FIXED,
+            note="a step of the repair: the rest of the plan is checked instead of compared",
+        )
+        if check.ok:
+            return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        if context.looks == 1:
+            return StrategyAnswer(
+                Decision.LOOK_AGAIN, verdict, why=check.reason, seconds=clock.items()
+            )
+        diagnosis = Diagnosis(
+            cause=f"the corrected plan would no longer work: {check.reason}",
+            must_change=check.lacking or check.unmet,
+            producer="plan check",
+        )
+        return self._alarm(context, verdict, diagnosis, clock)
+
+    def _alarm(
+        self,
+        context: BoundaryContext,
+        verdict: Verdict,
+        diagnosis: Diagnosis,
+        clock: _Clock,
+    ) -> StrategyAnswer:
         if not diagnosis.must_change:
             replan = Replan(ReplanOutcome.NOTHING_TO_CHANGE, producer=self._replanner.name)
             return StrategyAnswer(
@@ -105,7 +145,6 @@ class Proactive:
         clock.lap("replan")
         if replan.outcome is ReplanOutcome.SOLVED and replan.plan is not None:
             self._attempts[key] = self._attempts.get(key, 0) + 1
-            self._pending = frozenset(diagnosis.must_change)
             self._resume_left = _common_suffix(replan.plan, context)
             return StrategyAnswer(
                 Decision.REPLAN, verdict, diagnosis, replan, diagnosis.cause, clock.items()
@@ -133,13 +172,6 @@ class Proactive:
             "the plan at hand still checks out" if check.ok else f"stopped: {check.reason}"
         )
         return StrategyAnswer(decision, verdict, diagnosis, replan, why, clock.items())
-
-    def _without_pending(self, diagnosis: Diagnosis) -> Diagnosis:
-        left = tuple(fact for fact in diagnosis.must_change if fact not in self._pending)
-        if left == diagnosis.must_change:
-            return diagnosis
-        cause = diagnosis.cause if left else f"being repaired: {diagnosis.cause}"
-        return replace(diagnosis, must_change=left, cause=cause)
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
         """Go on: what went wrong shows at the next boundary."""

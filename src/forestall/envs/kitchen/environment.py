@@ -19,7 +19,7 @@ from forestall.envs.kitchen.household import Household, Placed
 from forestall.envs.kitchen.skills import Robot, SkillTimes, perform
 from forestall.errors import ForestallError
 from forestall.interfaces import Renderer, World
-from forestall.types.episode import Event, SkillOutcome, SkillStatus
+from forestall.types.episode import Event, SkillOutcome
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Subtask
@@ -37,13 +37,20 @@ class Stage(World, Protocol):
     """What the environment asks of a world beyond moving things: its contents and its camera."""
 
     @property
-    def instances(self) -> Iterable[Placed]: ...  # noqa: D102
+    def instances(self) -> Iterable[Placed]:
+        """Everything in the scene, prepared things included."""
+
     @property
-    def data(self) -> Any: ...  # noqa: D102
+    def data(self) -> Any:
+        """What the renderer draws."""
+
     @property
-    def robot_position_world_m(self) -> Vec3: ...  # noqa: D102
+    def robot_position_world_m(self) -> Vec3:
+        """Where the robot stands."""
+
     @property
-    def gripper_position_world_m(self) -> Vec3: ...  # noqa: D102
+    def gripper_position_world_m(self) -> Vec3:
+        """Where its hand is."""
 
     def look_at(self, point_world_m: Vec3) -> npt.NDArray[np.float64]:
         """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
@@ -154,7 +161,8 @@ class KitchenEnvironment:
         return self._observation(poses or [world.camera_to_world(0.0, AHEAD_TILT_RAD)])
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
-        """Run one skill, then let the automatic effects settle."""
+        """Run one skill; the automatic effects settle before it (time has passed) and after."""
+        effects.settle(self._acting.household, self._effect_config)
         outcome = perform(self._acting, subtask)
         effects.settle(self._acting.household, self._effect_config)
         return outcome
@@ -220,6 +228,3 @@ def _maker(renderer: str) -> MakeRenderer:
         return make_renderer(renderer, world.model, world.appearance, intrinsics)
 
     return make
-
-
-__all__ = ["KitchenEnvironment", "KitchenOracle", "SkillStatus", "Stage"]

@@ -8,7 +8,7 @@ the vocabulary.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from forestall.errors import UnknownNameError
 from forestall.interfaces import World
@@ -29,24 +29,30 @@ RELATION_EVENT = "relation"
 
 
 class Placed(Protocol):
-    """One instance as a scene builder names it.
-
-    `parent` is the receptacle that it starts in or on, `states` are (attribute, value) pairs,
-    `prepared` marks what is not there yet (slices, cracked eggs) and waits to replace something.
-    """
+    """One instance as a scene builder names it."""
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str:
+        """Instance name, e.g. "Mug-1"."""
+
     @property
-    def category(self) -> str: ...  # noqa: D102
+    def category(self) -> str:
+        """Category of the vocabulary."""
+
     @property
-    def parent(self) -> str | None: ...  # noqa: D102
+    def parent(self) -> str | None:
+        """The receptacle that it starts in or on."""
+
     @property
-    def states(self) -> Mapping[str, str] | tuple[tuple[str, str], ...]: ...  # noqa: D102
+    def states(self) -> Mapping[str, str] | tuple[tuple[str, str], ...]:
+        """(attribute, value) pairs."""
+
     @property
-    def prepared(self) -> bool: ...  # noqa: D102
+    def prepared(self) -> bool:
+        """Whether it is not there yet and waits to replace something (slices, cracked eggs)."""
 
 
+@runtime_checkable
 class Boxes(Protocol):
     """A world that can also say where its things are (the oracle's graph then has boxes)."""
 
@@ -301,11 +307,8 @@ class Household:
         return blocker if blocker in self._parents else None
 
     def _node(self, name: str) -> ObjectNode:
-        box = None
-        finder = getattr(self.world, "box_world_m", None)
-        corners = finder(name) if finder is not None else None
-        if corners is not None:
-            box = Box(*corners)
+        corners = self.world.box_world_m(name) if isinstance(self.world, Boxes) else None
+        box = None if corners is None else Box(*corners)
         return ObjectNode(
             id=name,
             category=self.vocabulary[name].name,

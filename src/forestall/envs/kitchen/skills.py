@@ -45,7 +45,10 @@ class SkillTimes:
 
 
 class Robot:
-    """Who acts: the household, the durations, and what the robot faces."""
+    """Who acts: the household, the durations, and what the robot faces.
+
+    `focus` is the last thing that was driven to or handled; something let go of lands there.
+    """
 
     def __init__(self, household: Household, times: SkillTimes) -> None:
         self.household = household
@@ -65,8 +68,11 @@ class Robot:
         self.focus = name
 
     def approach(self, name: str) -> None:
-        """Drive to a thing if it is out of reach."""
-        if name == self.household.held or self.household.world.within_reach(name):
+        """Drive to a thing if it is out of reach, and face it."""
+        if name == self.household.held:
+            return
+        if self.household.world.within_reach(name):
+            self.focus = name
             return
         self.drive(name)
         if not self.household.world.within_reach(name):
@@ -113,12 +119,13 @@ def pick_up(robot: Robot, what: str) -> str:
     if not home.category(name).pickupable:
         raise RefusalError(f"{name} cannot be picked up")
     robot.need_accessible(name)
+    facing = robot.focus
     robot.approach(name)
     blocker = home.blocker(name)
     if blocker is not None:
         raise RefusalError(f"{name} cannot be grasped: {blocker} stands in front of it")
-    if robot.focus == name:
-        robot.focus = home.parent(name)
+    in_reach = facing is not None and home.exists(facing) and home.world.within_reach(facing)
+    robot.focus = facing if in_reach and facing != name else home.parent(name)
     home.hold(name)
     return robot.done(robot.times.pick_s)
 
@@ -147,7 +154,7 @@ def _need_takes(robot: Robot, name: str, place: str) -> None:
     home = robot.household
     if home.category(place).receptacle is None:
         raise RefusalError(f"nothing can be put on or into {place}")
-    if place == name or name in home.ancestors(place):
+    if name in home.ancestors(place):
         raise RefusalError(f"{name} cannot be put into itself")
     if not home.vocabulary.accepts(place, name):
         raise RefusalError(f"{place} does not take {name}")

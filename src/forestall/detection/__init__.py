@@ -1,0 +1,1 @@
+"""Detectors: does the scene fit what the demonstrations showed before this subtask?"""

@@ -1,0 +1,106 @@
+"""The paper's detector: replan if no retrieved reference is similar enough (Sec. 3, S < 0.9).
+
+Called by the proactive strategy at each boundary; calls the graph scorer that it was given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from forestall.errors import InputError
+from forestall.interfaces import GraphScorer
+from forestall.types.graph import ObjectNode, SceneGraph, Seen
+from forestall.types.observation import Observation
+from forestall.types.verdict import Calibration, Decision, Reference, Verdict
+
+NO_REFERENCE = "no reference above the floor: nothing to compare with, so nothing was judged"
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorConfig:
+    """Threshold of the score below which a scene does not fit (paper: 0.9).
+
+    `located_share` is the share of the references that must have located an argument for its
+    absence to call for another look.
+    """
+
+    threshold: float = 0.9
+    calibration: Calibration = Calibration.FIXED
+    located_share: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.threshold <= 1:
+            raise InputError(f"threshold {self.threshold} is not between 0 and 1")
+
+
+class SceneGraphDetector:
+    """Judges by the best score over the references (implements `Detector`).
+
+    - any reference at or above the threshold: proceed;
+    - none, and an argument of the subtask that the references had located was not located here:
+      look again, because what was not seen cannot be called wrong;
+    - none otherwise: replan;
+    - no reference at all: proceed with score None and a note; nothing was judged.
+    """
+
+    name = "scene-graph"
+
+    def __init__(self, scorer: GraphScorer, config: DetectorConfig | None = None) -> None:
+        self._scorer = scorer
+        self._config = config or DetectorConfig()
+
+    def judge(
+        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+    ) -> Verdict:
+        """Compare the scoped graph of a boundary with every reference."""
+        config = self._config
+        best = self._scorer.best(observed, references)
+        if best is None or best.score is None:
+            return Verdict(
+                Decision.PROCEED,
+                self.name,
+                None,
+                config.threshold,
+                Calibration.UNCALIBRATED,
+                note=NO_REFERENCE,
+            )
+        verdict = replace(
+            best,
+            detector=self.name,
+            threshold=config.threshold,
+            calibration=config.calibration,
+        )
+        if best.score >= config.threshold:
+            return replace(verdict, decision=Decision.PROCEED)
+        unseen = unseen_arguments(observed, references, config.located_share)
+        if unseen:
+            note = f"not located here, but in the demonstrations: {', '.join(unseen)}"
+            return replace(verdict, decision=Decision.LOOK_AGAIN, note=note)
+        return replace(verdict, decision=Decision.REPLAN)
+
+
+def unseen_arguments(
+    observed: SceneGraph, references: Sequence[Reference], share: float
+) -> tuple[str, ...]:
+    """Arguments of the subtask that are not located here and were in the references."""
+    subtask = observed.subtask
+    if subtask is None:
+        return ()
+    same = [r for r in references if r.subtask.skill == subtask.skill] or list(references)
+    unseen = []
+    for role, name in subtask.roles().items():
+        if any(_located(observed.get(i)) for i in observed.matches(name)):
+            continue
+        shown = [
+            _located(r.graph.get(argument))
+            for r in same
+            if (argument := r.subtask.roles().get(role)) is not None
+        ]
+        if shown and sum(shown) >= share * len(shown):
+            unseen.append(name)
+    return tuple(unseen)
+
+
+def _located(node: ObjectNode | None) -> bool:
+    return node is not None and node.box_m is not None and node.seen is not Seen.UNOBSERVED

@@ -1,0 +1,1 @@
+"""Why the scene does not fit, and what must change."""

@@ -1,0 +1,142 @@
+"""Context-aware reference retrieval (paper, Sec. 3): which demonstrated steps are like this one.
+
+Called by strategies at each boundary; calls the text encoder. Exact search in one matrix.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forestall.errors import InputError, MemoryFileError
+from forestall.interfaces import DemonstrationStore, TextEncoder
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.plan import Subtask
+from forestall.types.verdict import Reference
+
+_NUMBER = re.compile(r"-\d+\b")
+_FAMILY = {"put_on": "put", "put_in": "put"}
+
+
+@dataclass(frozen=True, slots=True)
+class RetrievalConfig:
+    """Which stored steps count as references.
+
+    Args:
+        k: how many references at most.
+        floor: smallest similarity of the subtask texts. With hashed words the same skill on
+            another object scores 0.55 to 0.75 and the same words 1.0.
+        per_demonstration: how many steps of one demonstration at most. Two, so that a subtask that
+            occurs twice in a task is not taken for its other occurrence without a contradiction.
+        same_task_bonus: added to a similarity for ranking when the step is of the same task.
+        same_skill: whether only steps of the same skill count (put_on and put_in are one).
+    """
+
+    k: int = 8
+    floor: float = 0.6
+    per_demonstration: int = 2
+    same_task_bonus: float = 0.05
+    same_skill: bool = True
+
+    def __post_init__(self) -> None:
+        if self.k < 1 or self.per_demonstration < 1:
+            raise InputError("k and per_demonstration are at least 1")
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    demonstration: Demonstration
+    position: int  # in demonstration.steps
+    step: DemonstrationStep
+
+
+def subtask_words(subtask: Subtask) -> str:
+    """The text that is compared: the subtask's words without instance numbers.
+
+    All numbers are stripped: Mug-1 is a mug in every kitchen, and what was learnt in front of
+    StoveBurner-1 serves in front of StoveBurner-4.
+    """
+    return _NUMBER.sub("", subtask.words())
+
+
+class EmbeddingRetriever:
+    """References by similarity of the subtask texts (implements `Retriever`).
+
+    Args:
+        demonstrations: a store, or the demonstrations themselves.
+        encoder: embeds subtask texts.
+        config: how many references, and how similar.
+
+    Raises:
+        MemoryFileError: there are no demonstrations.
+    """
+
+    def __init__(
+        self,
+        demonstrations: DemonstrationStore | Sequence[Demonstration],
+        encoder: TextEncoder,
+        config: RetrievalConfig | None = None,
+    ) -> None:
+        loaded = demonstrations if isinstance(demonstrations, Sequence) else demonstrations.all()
+        self._encoder = encoder
+        self._config = config or RetrievalConfig()
+        self._entries = [
+            _Entry(d, i, s)
+            for d in sorted(loaded, key=lambda d: d.id)
+            for i, s in enumerate(d.steps)
+        ]
+        if not self._entries:
+            raise MemoryFileError(
+                "the memory holds no demonstrations: record some with 'forestall demos record'"
+            )
+        self._matrix = encoder.encode([subtask_words(e.step.subtask) for e in self._entries])
+        self._tasks = np.array([e.demonstration.task for e in self._entries])
+        self._indices = np.array([e.step.index for e in self._entries])
+        self._skills = np.array([_family(e.step.subtask) for e in self._entries])
+
+    def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
+        """References for a subtask, best first; none above the floor: an empty list.
+
+        Ranked by similarity with the bonus of the same task; among equals the step whose position
+        in its demonstration is closest to `done` comes first, then demonstration and position.
+        """
+        config = self._config
+        similarity = self._matrix @ self._encoder.encode([subtask_words(subtask)])[0]
+        similarity = np.minimum(np.round(similarity.astype(np.float64), 6), 1.0)
+        allowed = similarity >= config.floor
+        if config.same_skill:
+            allowed &= self._skills == _family(subtask)
+        rank = similarity + config.same_task_bonus * (self._tasks == task)
+        gap = np.abs(self._indices - done)
+        found: list[Reference] = []
+        used: dict[int, int] = {}
+        for i in np.lexsort((np.arange(len(rank)), gap, -rank)).tolist():
+            entry = self._entries[i]
+            owner = id(entry.demonstration)
+            if not allowed[i] or used.get(owner, 0) >= config.per_demonstration:
+                continue
+            used[owner] = used.get(owner, 0) + 1
+            found.append(_reference(entry, float(similarity[i])))
+            if len(found) == config.k:
+                break
+        return found
+
+
+def _reference(entry: _Entry, similarity: float) -> Reference:
+    demonstration = entry.demonstration
+    return Reference(
+        demonstration=demonstration.id,
+        task=demonstration.task,
+        index=entry.step.index,
+        subtask=entry.step.subtask,
+        similarity=similarity,
+        graph=entry.step.graph,
+        later=tuple(s.subtask for s in demonstration.steps[entry.position :]),
+    )
+
+
+def _family(subtask: Subtask) -> str:
+    return _FAMILY.get(subtask.skill, subtask.skill)

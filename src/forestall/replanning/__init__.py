@@ -1,0 +1,1 @@
+"""The corrected plan: by our own planner, or by a language model."""

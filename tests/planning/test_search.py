@@ -1,0 +1,198 @@
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from forestall.planning.domain import Refusal, apply
+from forestall.planning.planner import plan_goal, plan_to, pose
+from forestall.planning.problem import Atom, Problem
+from forestall.planning.relevance import alternatives
+from forestall.planning.search import SearchConfig, SearchOutcome, solve
+from forestall.planning.state import State
+from forestall.planning.validate import GraphValidator, observed
+from forestall.types.facts import Literal
+from forestall.types.plan import Plan
+from forestall.types.task import Goal
+from forestall.types.verdict import ReplanOutcome
+from planning.corpus import GOALS, KITCHEN, VOCABULARY, goal, home_of, scene
+
+DISTURBED = {
+    "heat-potato": "Bowl-1 in Microwave-1, Plate-1 is dirty, Apple-1 on Plate-1",
+    "make-coffee": "Cup-1 in CoffeeMachine-1, Mug-1 is dirty, Mug-1 is wine, Mug-1 in Cabinet-1",
+    "cook-egg": "Pan-1 is dirty, Potato-1 in Pan-1, Pot-1 on StoveBurner-1",
+    "make-salad": "Bowl-1 is wine, Bowl-1 is dirty, Pot-1 on CounterTop-1, Pot-1 blocks Knife-1",
+    "boil-water": "Pan-1 on StoveBurner-4, Pot-1 is wine, Apple-1 in Pot-1",
+    "toast-bread": "Pot-1 on CounterTop-1, Pot-1 blocks Knife-1, BreadSliced-9 in Toaster-1",
+    "store-egg": "Bowl-1 is wine, Apple-1 in Bowl-1",
+    "warm-water": "Bowl-1 in Microwave-1, Mug-1 is coffee",
+    "water-plant": "Pot-1 in Cabinet-1, Bowl-1 in Cabinet-1, Mug-1 in Fridge-1",
+    "switch-devices": "Television-1, Laptop-1 in Shelf-1",
+}
+
+
+def atoms_of(problem: Problem, state: State) -> set[Atom]:
+    """What a symbolic state says about every positive atom of a problem."""
+    true = set()
+    for atom in problem.atoms:
+        positive = atom[1:] if atom[0] == "not" else atom
+        kind, *args = positive
+        holds = {
+            "at": lambda a: state.holds(Literal(a[1], (a[0], a[2]))),
+            "loose": lambda a: (
+                a[0] in state.kinds and a[0] not in state.places and a[0] != state.held
+            ),
+            "held": lambda a: state.held == a[0],
+            "hand_empty": lambda a: state.held is None,
+            "is": lambda a: state.value(a[0], a[1]) == a[2],
+            "reach": lambda a: state.closed_around(a[0]) is None,
+            "clear": lambda a: (a[0], a[1]) not in state.blocking,
+            "free": lambda a: _free(state, a[0]) == int(a[1]),
+            "intact": lambda a: a[0] not in state.spoiled,
+            "located": lambda a: a[0] not in state.lost,
+        }[kind](args)
+        if holds != (atom[0] == "not"):
+            true.add(atom)
+    return true
+
+
+def _free(state: State, name: str) -> int:
+    shape = state.category(name).receptacle
+    assert shape is not None and shape.capacity is not None
+    return shape.capacity - len(state.contents(name, shape.relation))
+
+
+def _comparable(atom: Atom, state: State) -> bool:
+    """Atoms about things that do not exist (yet, or any more) mean nothing to a state."""
+    positive = atom[1:] if atom[0] == "not" else atom
+    names = [a for a in positive[1:] if "-" in a]
+    return all(n in state.kinds for n in names)
+
+
+@pytest.mark.parametrize("task", sorted(GOALS))
+@pytest.mark.parametrize("disturbed", [False, True])
+def test_operators_and_skills_agree_on_random_walks(task: str, disturbed: bool) -> None:
+    graph = scene(home_of(task), DISTURBED[task] if disturbed else "")
+    first = observed(graph, VOCABULARY)
+    problem = pose(first, alternatives(first, GOALS[task]))
+    rng = random.Random(7)
+    steps = 0
+    for _ in range(12):
+        bits, state = problem.initial, first
+        for _ in range(25):
+            ready = [o for o in problem.operators if o.condition & bits == o.condition]
+            if not ready:
+                break
+            operator = rng.choice(ready)
+            if operator.over is not None:
+                state.at = operator.over
+            after = apply(state, operator.subtask)
+            assert not isinstance(after, Refusal), f"{operator.subtask}: {after}"
+            bits, state = operator.apply(bits), after
+            said = set(problem.names(bits))
+            true = atoms_of(problem, state)
+            differ = {a for a in said ^ true if _comparable(a, state)}
+            assert not differ, f"after {operator.subtask}: {sorted(differ)}"
+            steps += 1
+    assert steps > 50
+
+
+@pytest.mark.parametrize("task", sorted(GOALS))
+@pytest.mark.parametrize("disturbed", [False, True])
+def test_planning_from_scratch_reaches_the_goal(task: str, disturbed: bool) -> None:
+    graph = scene(home_of(task), DISTURBED[task] if disturbed else "")
+    planned = plan_goal(observed(graph, VOCABULARY), GOALS[task])
+    assert planned.outcome is ReplanOutcome.SOLVED, planned.note
+    check = GraphValidator(VOCABULARY).check(Plan(planned.subtasks), graph, GOALS[task])
+    assert check.ok, check.reason
+
+
+UNSOLVABLE: dict[str, tuple[str, Goal]] = {
+    "lost mug": ("Mug-1 lost", GOALS["make-coffee"]),
+    "spoiled egg": (
+        "EggCracked-1 in Pan-1, StoveBurner-1 is on, Pan-1 on StoveBurner-1, Pan-1 is dirty",
+        goal(
+            "inside(EggCracked-1, Pan-1)",
+            "cooked(EggCracked-1)=raw",
+        ),
+    ),
+    "a pan in the microwave": ("", goal("inside(Pan-1, Microwave-1)")),
+    "two things in the microwave": (
+        "",
+        goal("inside(Mug-1, Microwave-1)", "inside(Bowl-1, Microwave-1)"),
+    ),
+    "a raw potato again": ("Potato-1 is cooked", goal("cooked(Potato-1)=raw")),
+    "slices without a knife": ("Knife-1 lost", GOALS["toast-bread"]),
+    "a broken plate mended": ("Plate-1 is broken", goal("broken(Plate-1)=intact")),
+}
+
+
+@pytest.mark.parametrize("name", sorted(UNSOLVABLE))
+def test_dead_ends_are_proven_with_a_reason(name: str) -> None:
+    where, wanted = UNSOLVABLE[name]
+    planned = plan_goal(observed(scene(KITCHEN, where), VOCABULARY), wanted)
+    assert planned.outcome is ReplanOutcome.UNSOLVABLE
+    assert planned.note
+
+
+def test_a_lost_thing_is_named() -> None:
+    planned = plan_goal(observed(scene(KITCHEN, "Mug-1 lost"), VOCABULARY), GOALS["make-coffee"])
+    assert "Mug: its place is not known" in planned.note
+
+
+def test_running_out_of_time_is_told_apart() -> None:
+    state = observed(scene(KITCHEN), VOCABULARY)
+    planned = plan_goal(state, GOALS["make-salad"], SearchConfig(max_expansions=2))
+    assert planned.outcome is ReplanOutcome.TIMEOUT
+    planned = plan_goal(state, GOALS["make-salad"], SearchConfig(time_limit_s=0.0))
+    assert planned.outcome is ReplanOutcome.TIMEOUT
+
+
+def test_geometry_is_unsupported() -> None:
+    state = observed(scene(KITCHEN), VOCABULARY)
+    planned = plan_goal(state, goal("near(Mug-1, Cup-1)"))
+    assert planned.outcome is ReplanOutcome.UNSUPPORTED
+
+
+def test_a_goal_that_holds_needs_no_step() -> None:
+    state = observed(scene(KITCHEN), VOCABULARY)
+    planned = plan_goal(state, goal("on_top_of(Mug, CounterTop)", "hand_empty()"))
+    assert (planned.outcome, planned.subtasks) == (ReplanOutcome.SOLVED, ())
+
+
+def test_negative_vacant_and_unblocked_goals() -> None:
+    graph = scene(KITCHEN, "Pot-1 on CounterTop-1, Pot-1 blocks Knife-1, Cup-1 in Fridge-1")
+    state = observed(graph, VOCABULARY)
+    wanted = goal("not inside(Cup-1, Fridge-1)", "unblocked(Knife-1)", "held_by(Cup-1, gripper)")
+    planned = plan_goal(state, wanted)
+    assert planned.outcome is ReplanOutcome.SOLVED
+    assert planned.final is not None
+    assert all(planned.final.holds(x) for x in wanted.literals)
+
+
+def test_planning_is_deterministic() -> None:
+    state = observed(scene(KITCHEN, DISTURBED["make-salad"]), VOCABULARY)
+    assert (
+        plan_goal(state, GOALS["make-salad"]).subtasks
+        == plan_goal(state, GOALS["make-salad"]).subtasks
+    )
+
+
+def test_search_proves_unsolvability_by_exhaustion() -> None:
+    state = observed(scene(KITCHEN), VOCABULARY)
+    wanted = goal("inside(Mug-1, CoffeeMachine-1)", "inside(Cup-1, CoffeeMachine-1)")
+    problem = pose(state, alternatives(state, wanted))
+    result = solve(problem)
+    assert result.outcome is SearchOutcome.UNSOLVABLE
+    assert result.expanded > 1
+
+
+def test_parking_names_the_kind_of_support_and_never_the_floor() -> None:
+    state = observed(scene(KITCHEN, "Bowl-1 in Microwave-1, Microwave-1 is open"), VOCABULARY)
+    planned = plan_to(state, [(Literal("vacant", ("Microwave-1",)), Literal("hand_empty", ()))])
+    assert [str(s) for s in planned.subtasks] == [
+        "navigate_to_obj(Microwave-1)",
+        "pick_up(Bowl-1)",
+        "navigate_to_obj(CounterTop)",
+        "put_on(Bowl-1, CounterTop)",
+    ]
