@@ -51,9 +51,7 @@ PUT = "put_in(Plate-1, Microwave-1)"
 MEAL = "gripper; Plate-1 dirty=clean broken=intact; Potato-1 cooked=raw; Microwave-1 open=open"
 HELD = "Plate-1 held_by gripper; Potato-1 on_top_of Plate-1"
 EXPECTED = scene(MEAL, HELD, PUT)
-OCCUPIED = scene(
-    MEAL + "; Bowl-1 filled=empty", HELD + "; Bowl-1 inside Microwave-1", PUT
-)
+OCCUPIED = scene(MEAL + "; Bowl-1 filled=empty", HELD + "; Bowl-1 inside Microwave-1", PUT)
 DIRTY = scene(MEAL.replace("clean", "dirty"), HELD, PUT)
 CLOSED = scene(MEAL.replace("open=open", "open=closed"), HELD, PUT)
 
@@ -70,7 +68,9 @@ COFFEE = "put_in(Mug-1, CoffeeMachine-1)"
 MUG_HELD = scene("gripper; Mug-1; CoffeeMachine-1", "Mug-1 held_by gripper", COFFEE)
 MUG_DROPPED = scene("gripper; Mug-1; CoffeeMachine-1; Floor-1", "Mug-1 on_top_of Floor-1", COFFEE)
 
-KNIFE = scene("gripper; Knife-1; CounterTop-1", "Knife-1 on_top_of CounterTop-1", "pick_up(Knife-1)")
+KNIFE = scene(
+    "gripper; Knife-1; CounterTop-1", "Knife-1 on_top_of CounterTop-1", "pick_up(Knife-1)"
+)
 BLOCKED = scene(
     "gripper; Knife-1; CounterTop-1; Pot-1",
     "Knife-1 on_top_of CounterTop-1; Pot-1 on_top_of CounterTop-1; Pot-1 blocking Knife-1",
@@ -155,7 +155,14 @@ PAIRS = [
     ),
     Pair("nothing, as expected", NOTHING, NOTHING, 1, 1, 1, 1),
     Pair(
-        "nothing to compare", NOTHING, NOTHING, None, None, None, 1, ScoreConfig(empty=EmptyRule.SKIP)
+        "nothing to compare",
+        NOTHING,
+        NOTHING,
+        None,
+        None,
+        None,
+        1,
+        ScoreConfig(empty=EmptyRule.SKIP),
     ),
     Pair("nothing of what was expected", NOTHING, scene("Mug-1"), 0, 1, 0, 1 / 3),
     Pair(

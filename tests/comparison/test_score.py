@@ -176,8 +176,9 @@ def test_best_takes_the_first_of_equal_references() -> None:
 def test_a_small_cache_changes_nothing() -> None:
     rng = np.random.default_rng(4)
     many = [random_graph(8, rng) for _ in range(40)]
-    small, large = BatchScorer(ScoreConfig(), ENCODER, cache_size=3), BatchScorer(
-        ScoreConfig(), ENCODER
+    small, large = (
+        BatchScorer(ScoreConfig(), ENCODER, cache_size=3),
+        BatchScorer(ScoreConfig(), ENCODER),
     )
     for g in many[:5]:
         assert small.scores(g, many) == large.scores(g, many)

@@ -50,7 +50,9 @@ def test_texts_without_words_share_one_vector() -> None:
 
 
 def test_related_texts_are_closer() -> None:
-    rows = HashedTextEncoder().encode(["pick up Mug", "pick up Mugs", "pick up Bowl", "open Fridge"])
+    rows = HashedTextEncoder().encode(
+        ["pick up Mug", "pick up Mugs", "pick up Bowl", "open Fridge"]
+    )
     same, skill, other = rows[0] @ rows[1:].T
     assert same > 0.99
     assert 0.5 < skill < 0.8

@@ -91,7 +91,7 @@ def evaluate(literal: Literal, graph: SceneGraph, subtask: Subtask) -> Truth:
     """The truth of a lifted literal in a graph, its variables bound to the subtask's arguments.
 
     A literal about an argument that is no node of the graph is unobserved. What the gripper holds
-    is always known.
+    is always known, and so is that it stands nowhere else.
     """
     ground = literal.bind(subtask.roles())
     for raw, name in zip(literal.args, ground.args, strict=True):
@@ -102,6 +102,8 @@ def evaluate(literal: Literal, graph: SceneGraph, subtask: Subtask) -> Truth:
     first = literal.args[0] if literal.args else ""
     if ground.predicate in ("inside", "on_top_of") and not first.startswith("?"):
         return _contains(ground, graph)
+    if ground.predicate in ("inside", "on_top_of") and graph.holding == ground.args[0]:
+        return Truth.TRUE if ground.value == "false" else Truth.FALSE
     return graph.truth(ground)
 
 

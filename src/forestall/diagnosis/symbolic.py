@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from forestall.types.facts import GRIPPER, Literal, Truth, category_of
+from forestall.types.facts import GRIPPER, Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext
@@ -75,7 +75,7 @@ class SymbolicReasoner:
         stay = {x for x in ground if x not in failed and graph.truth(x) is Truth.TRUE}
         causes = [explain(v, graph, context.plan.subtasks[context.index]) for v in broken]
         culprits = dict.fromkeys(
-            y for v in broken for x in _culprits(v.literal, graph) for y in graph.matches(x) or (x,)
+            y for v in broken for x in _culprits(v.literal, graph) for y in _ids(graph, x)
         )
         return Diagnosis(
             cause=causes[0],
@@ -87,6 +87,11 @@ class SymbolicReasoner:
 
     def _nothing(self, cause: str) -> Diagnosis:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
+
+
+def _ids(graph: SceneGraph, name: str) -> tuple[str, ...]:
+    """Node ids of a name; an instance that has gone out of the graph keeps its name."""
+    return graph.matches(name) or ((name,) if is_instance(name) else ())
 
 
 def explain(violation: Violation, graph: SceneGraph, subtask: Subtask) -> str:

@@ -30,7 +30,7 @@ class Cloud:
     """What one mask shows of an object.
 
     `points_world_m` is (n, 3), sorted by voxel; `low_m`, `high_m` and `centroid_m` are (3,).
-    `pixels` counts the mask, `image_box` is (left, top, right, bottom), inclusive.
+    `pixels` counts the mask.
     """
 
     points_world_m: Points
@@ -38,7 +38,6 @@ class Cloud:
     high_m: Points
     centroid_m: Points
     pixels: int
-    image_box: tuple[int, int, int, int]
 
 
 def label_image(detections: Sequence[Detection], shape: tuple[int, int]) -> Labels:
@@ -100,7 +99,6 @@ def clouds(
     count = len(voxel_m)
     flat = labels.ravel()
     pixels = np.bincount(flat + 1, minlength=count + 1)[1:]
-    boxes = _image_boxes(labels, count)
     if count == 0:
         return []
     low_bits = _low_bits(pixels, config)
@@ -117,7 +115,7 @@ def clouds(
             continue
         low, high = robust_box(own, config.box_percentile)
         centroid = np.average(own, axis=0, weights=weights[starts[i] : starts[i + 1]])
-        result.append(Cloud(own, low, high, centroid, int(pixels[i]), boxes[i]))
+        result.append(Cloud(own, low, high, centroid, int(pixels[i])))
     return result
 
 
@@ -128,22 +126,6 @@ def robust_box(points_m: Points, share: float) -> tuple[Points, Points]:
         return points_m.min(axis=0), points_m.max(axis=0)
     ordered = np.partition(points_m, (cut, len(points_m) - 1 - cut), axis=0)
     return ordered[cut], ordered[len(points_m) - 1 - cut]
-
-
-def _image_boxes(labels: Labels, count: int) -> list[tuple[int, int, int, int]]:
-    """Bounds of each label, from which columns and rows it occurs in."""
-    boxes = []
-    height, width = labels.shape
-    in_column = np.zeros((count + 1, width), dtype=bool)
-    in_row = np.zeros((count + 1, height), dtype=bool)
-    in_column[labels, np.arange(width)[None, :]] = True
-    in_row[labels, np.arange(height)[:, None]] = True
-    for i in range(count):
-        u, v = np.flatnonzero(in_column[i]), np.flatnonzero(in_row[i])
-        boxes.append(
-            (int(u[0]), int(v[0]), int(u[-1]), int(v[-1])) if len(u) and len(v) else (0, 0, -1, -1)
-        )
-    return boxes
 
 
 def _low_bits(pixels: npt.NDArray[np.int64], config: PerceptionConfig) -> npt.NDArray[np.int64]:

@@ -298,14 +298,16 @@ def universe(
         closure.want(literal)
     for literal in dict.fromkeys(x for goal in goals for x in goal):
         closure.want(literal)
-    chosen = _supports(state, closure.kept)[:supports]
+    blocked = {x.args[0] for goal in goals for x in goal if x.predicate == "unblocked"}
+    chosen = _supports(state, closure.kept, {state.root(x) for x in blocked})[:supports]
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
     made = {s: tuple(sorted(m, key=by_number)) for s, m in sorted(closure.made.items())}
     return Universe(things, made, frozenset(closure.purposeful), tuple(chosen))
 
 
-def _supports(state: State, kept: set[str]) -> list[str]:
+def _supports(state: State, kept: set[str], avoid: set[str]) -> list[str]:
+    """Supports in order of preference: room first, not where something is to be unblocked."""
     found = []
     for name, category in state.kinds.items():
         shape = state.vocabulary.categories[category].receptacle
@@ -316,5 +318,11 @@ def _supports(state: State, kept: set[str]) -> list[str]:
     order = {c: i for i, c in enumerate(SUPPORTS)}
     return sorted(
         found,
-        key=lambda x: (order.get(state.kinds[x], len(order)), x not in kept, by_number(x)),
+        key=lambda x: (
+            x in state.crowded,
+            x in avoid,
+            order.get(state.kinds[x], len(order)),
+            x not in kept,
+            by_number(x),
+        ),
     )

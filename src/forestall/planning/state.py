@@ -29,6 +29,9 @@ SUPPORTED = (
 )
 """Predicates that a symbolic state decides; the others are geometry."""
 
+CROWDED = 0.6
+"""Share of a support's footprint from which on another one is preferred."""
+
 
 def number_of(name: str) -> int:
     """The instance number of a name, 1 where it carries none."""
@@ -62,6 +65,7 @@ class State:
         blocking: (front, behind) pairs.
         spoiled: things to which something irreversible has happened.
         hidden: containers whose inside was not observed and is assumed empty.
+        crowded: supports with little free area, as far as the boxes of the graph tell.
         assumed: facts that were not observed and are taken from the vocabulary.
     """
 
@@ -75,6 +79,7 @@ class State:
     blocking: frozenset[tuple[str, str]] = frozenset()
     spoiled: frozenset[str] = frozenset()
     hidden: frozenset[str] = frozenset()
+    crowded: frozenset[str] = frozenset()
     assumed: frozenset[Literal] = frozenset()
 
     @classmethod
@@ -111,6 +116,7 @@ class State:
         )
         state.hidden = frozenset(h for h in graph.hidden if h in state.kinds)
         state.assumed = frozenset(assumed)
+        state.crowded = _crowded(graph)
         return state
 
     def copy(self) -> State:
@@ -126,6 +132,7 @@ class State:
             self.blocking,
             self.spoiled,
             self.hidden,
+            self.crowded,
             self.assumed,
         )
 
@@ -244,6 +251,16 @@ class State:
             "spoiled": name in self.spoiled,
         }
         return simple.get(predicate, False)
+
+
+def _crowded(graph: SceneGraph) -> frozenset[str]:
+    """Things whose contents cover more than `CROWDED` of their own footprint."""
+    covered: dict[str, float] = {}
+    area_m2 = {n.id: n.box_m.size[0] * n.box_m.size[1] for n in graph.nodes if n.box_m is not None}
+    for r in graph.relations:
+        if r.predicate == "on_top_of":
+            covered[r.object] = covered.get(r.object, 0.0) + area_m2.get(r.subject, 0.0)
+    return frozenset(x for x, a in covered.items() if x in area_m2 and a > CROWDED * area_m2[x])
 
 
 def _places(graph: SceneGraph, state: State) -> dict[str, Place]:

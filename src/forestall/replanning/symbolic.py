@@ -73,10 +73,10 @@ class PlannerReplanner:
         state = observed(context.graph, self.vocabulary)
         repairs: list[Planned] = []
         for repair in self._repairs(attempts, state, context, wanted, diagnosis.must_stay):
-            rest = _rest(context, state, bool(repair.subtasks))
-            accepted = self._checked(attempts, context, (*repair.subtasks, *rest))
-            if accepted is not None:
-                return accepted
+            for rest in _rests(context, state, bool(repair.subtasks)):
+                accepted = self._checked(attempts, context, (*repair.subtasks, *rest))
+                if accepted is not None:
+                    return accepted
             repairs.append(repair)
         for repair in (*repairs[:1], Planned(ReplanOutcome.SOLVED, (), state)):
             if repair.final is None:
@@ -118,7 +118,13 @@ class PlannerReplanner:
 
     def _plan(self, attempts: _Attempts, state: State, facts: Sequence[Literal]) -> Planned:
         goals = alternatives(state, Goal("", literals=tuple(facts)))
-        return attempts.count(plan_to(state, goals, self.config))
+        planned = attempts.count(plan_to(state, goals, self.config))
+        running = _left_running(state, planned, facts)
+        if not running:
+            return planned
+        goals = alternatives(state, Goal("", literals=(*facts, *running)))
+        tidy = attempts.count(plan_to(state, goals, self.config))
+        return tidy if tidy.outcome is ReplanOutcome.SOLVED else planned
 
     def _can(self, state: State, literal: Literal) -> bool:
         goals = alternatives(state, Goal("", literals=(literal,)))
@@ -212,10 +218,27 @@ def _unspoiled(state: State, goal: Goal, wanted: Sequence[Literal]) -> list[Lite
     ]
 
 
-def _rest(context: BoundaryContext, state: State, repaired: bool) -> tuple[Subtask, ...]:
+def _left_running(state: State, planned: Planned, facts: Sequence[Literal]) -> list[Literal]:
+    """Devices that a repair would leave on although they were off and nothing asks for it."""
+    if planned.final is None:
+        return []
+    asked = {x.args[0] for x in facts if x.predicate == "toggled"}
+    return [
+        Literal("toggled", (name,), "off")
+        for name in sorted(state.kinds)
+        if state.value(name, "toggled") == "off"
+        and planned.final.value(name, "toggled") == "on"
+        and name not in asked
+    ]
+
+
+def _rests(
+    context: BoundaryContext, state: State, repaired: bool
+) -> tuple[tuple[Subtask, ...], ...]:
     """What is left of the current plan, with the drive that led to its first step.
 
-    Categories of which there are several are bound to the thing that the robot deals with now.
+    First with categories of which there are several bound to the thing that the robot deals with
+    now, then as it stands.
     """
     rest = context.plan.subtasks[context.index :]
     before = context.plan.subtasks[context.index - 1 : context.index] if context.index else ()
@@ -228,7 +251,8 @@ def _rest(context: BoundaryContext, state: State, repaired: bool) -> tuple[Subta
             continue
         if len(state.instances(kind)) > 1:
             bound[kind] = name
-    return tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
+    named = tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
+    return (named,) if named == rest else (named, rest)
 
 
 def _is_lost(state: State, name: str) -> bool:

@@ -20,21 +20,21 @@ _WHITE = (0.92, 0.93, 0.94, 1.0)
 def fridge(kit: Kit, item: Item, style: Style) -> Forms:
     """A fridge over a freezer drawer, its door hinged at the side `item.hinge`."""
     part = kit.furniture(item.name, item.name, (item.x, item.y, 0, item.yaw))
-    w, d, h, t, low = item.width, 0.64, 1.78, 0.035, 0.72
+    w, d, h, t, low = item.width, 0.64, 1.80, 0.035, 0.86
     shell = style.fridge
     part.box((0, d / 2, low / 2), (w, d, low), shell, texture="metal")
-    part.box((0, d + 0.026, 0.40), (w - 0.004, 0.045, 0.56), shell, texture="metal", solid=False)
+    part.box((0, d + 0.026, 0.485), (w - 0.004, 0.045, 0.73), shell, texture="metal", solid=False)
     part.box((0, d + 0.010, 0.06), (w - 0.01, 0.02, 0.10), DARK, solid=False)
-    part.box((0, d + 0.075, 0.62), (w * 0.6, 0.018, 0.022), style.handle, texture="metal", solid=False)
+    part.box((0, d + 0.075, 0.76), (w * 0.6, 0.018, 0.022), style.handle, texture="metal", solid=False)
     for side in (-1, 1):
-        part.box((side * w * 0.26, d + 0.058, 0.62), (0.016, 0.03, 0.016), style.handle, solid=False)
+        part.box((side * w * 0.26, d + 0.058, 0.76), (0.016, 0.03, 0.016), style.handle, solid=False)
         part.box((side * (w / 2 - t / 2), d / 2, (low + h) / 2), (t, d, h - low), shell)
         part.box((side * (w / 2 - t - 0.002), d / 2, (low + h) / 2), (0.004, d - 0.01, h - low - 0.01),
                  _WHITE, solid=False)  # fmt: skip
     part.box((0, d / 2, h - t / 2), (w - 2 * t, d, t), shell)
     part.box((0, t / 2, (low + h) / 2), (w - 2 * t, t, h - low), _WHITE)
     part.box((0, d / 2, low + 0.012), (w - 2 * t, d - 0.01, 0.024), _WHITE)
-    upper = 1.24
+    upper = 1.31
     part.box((0, (d - 0.09) / 2 + t, upper - 0.006), (w - 2 * t, d - 0.16, 0.012),
              (0.78, 0.86, 0.88, 1), texture="ceramic")  # fmt: skip
     part.box((0, d - 0.11, upper - 0.004), (w - 2 * t, 0.012, 0.022), STEEL, solid=False)
@@ -137,7 +137,7 @@ def coffee_machine(kit: Kit, item: Item, style: Style) -> Forms:
              solid=False)  # fmt: skip
     area = Rect(-w / 2, 0.125, w / 2, d)
     region = Region(item.name, item.name, area, 0.0305, 0.205, kind="spot")
-    stance = Stance(COUNTER_DEPTH_M - item.inset, distance_m=0.62)
+    stance = Stance(COUNTER_DEPTH_M - item.inset, distance_m=0.76)
     return {item.name: Form(Rect(-w / 2, 0, w / 2, d), h, regions=(region,), stance=stance)}
 
 

@@ -6,7 +6,7 @@ Frames: a thing or a piece of furniture has its origin on its lower side, z up a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -88,6 +88,7 @@ class Region:
         keep_out: parts of `area` that stay empty.
         front_m: y of the open edge; None where nothing can be in the way.
         first_m: y nearest to which things are put first (default: the front of `area`).
+        yaw_rad: how a thing in a "spot" is turned.
     """
 
     receptacle: str
@@ -100,6 +101,7 @@ class Region:
     keep_out: tuple[Rect, ...] = ()
     front_m: float | None = None
     first_m: float | None = None
+    yaw_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +138,6 @@ class Form:
     regions: tuple[Region, ...] = ()
     stance: Stance | None = None
     hollow_m: float = 0.0
-    notes: tuple[str, ...] = field(default=())
 
 
 def pose_at(x: float, y: float, z: float, yaw_rad: float = 0.0) -> Pose:

@@ -231,12 +231,13 @@ def stove(kit: Kit, item: Item, style: Style) -> Forms:
     knobs = [0.10, -0.10, 0.28, -0.28]
     for k, ((x, y), knob_x) in enumerate(zip(places, knobs, strict=True)):
         burner, knob = item.extra[k], item.extra[4 + k]
-        forms[burner] = _burner(kit, item, burner, x, y, top)
+        forms[burner] = _burner(kit, item, burner, (x, y), top)
         forms[knob] = _knob(kit, item, knob, burner, knob_x, d + 0.022, 0.808, tilt)
     return forms
 
 
-def _burner(kit: Kit, item: Item, name: str, x: float, y: float, top: float) -> Form:
+def _burner(kit: Kit, item: Item, name: str, at: tuple[float, float], top: float) -> Form:
+    x, y = at
     px, py, _, yaw = item.local_pose(x, y)
     part = kit.furniture(name, name, (px, py, top, yaw))
     part.cylinder((0, 0, 0.002), 0.134, 0.004, (0.13, 0.13, 0.14, 1), texture="metal")
@@ -255,7 +256,8 @@ def _burner(kit: Kit, item: Item, name: str, x: float, y: float, top: float) -> 
         flames.append(meshes.moved(tongue, 0.118 * np.cos(a), 0.118 * np.sin(a), 0.005))
     part.mesh(meshes.merged(flames), (1.0, 0.62, 0.10, 1), when=on)
     area = Rect(-0.12, -0.12, 0.12, 0.12)
-    region = Region(name, name, area, 0.0225, kind="spot")
+    turn_rad = -float(np.sign(x)) * float(np.deg2rad(40 if y > 0.3 else 65))
+    region = Region(name, name, area, 0.0225, kind="spot", yaw_rad=turn_rad)
     return Form(
         Rect(-0.134, -0.134, 0.134, 0.134), 0.022, regions=(region,),
         stance=Stance(COUNTER_DEPTH_M - y, distance_m=0.62),

@@ -21,6 +21,7 @@ STANDING_M = 0.95
 """Free floor in front of everything that the robot works at."""
 
 _CORNER, _FRIDGE, _FRIDGE_GAP, _STOVE = 0.64, 0.70, 0.20, 0.76
+_HANDLE = 0.11
 _APPLIANCES = {  # kind → free width to its left (towards -x) and right on the counter, own depth
     "microwave": (0.28, 0.39, 0.06),
     "coffee_machine": (0.14, 0.14, 0.05),
@@ -345,9 +346,15 @@ def _lay_run(draft: Draft, run: _Run) -> None:
                 sink_x = float(rng.choice([-1, 1])) * float(rng.uniform(0.3, 1.0)) * reach
                 extra = (draft.name("Sink"), draft.name("Faucet"))
                 draft.decor.append(("window", run.wall, u - width / 2 + sink_x, 1.40, 0.95, 0.72))
+            kinds = [m[0] for m in (("", 0.0), *run.modules, ("", 0.0))]
+            beside = []  # room for the handles of pans on the stove
+            if kinds[k] == "stove":
+                beside.append((-width / 2, -width / 2 + _HANDLE))
+            if kinds[k + 2] == "stove":
+                beside.append((width / 2 - _HANDLE, width / 2))
             draft.add(
                 Item("counter", draft.name("CounterTop"), x, y, yaw, width, COUNTER_DEPTH_M,
-                     sink_x=sink_x, extra=extra)
+                     sink_x=sink_x, extra=extra, keep_out=tuple(beside))
             )  # fmt: skip
 
 

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from graph_pairs import (
+    BLOCKED,
+    CLOSED,
+    DIRTY,
+    EXPECTED,
+    KNIFE,
+    MUG_DROPPED,
+    MUG_HELD,
+    OCCUPIED,
+    SPREAD,
+    TOGETHER,
+    scene,
+)
+
+from forestall.comparison.score import ScoreConfig, compare
+from forestall.embeddings import HashedTextEncoder
+from forestall.types.graph import SceneGraph
+from forestall.types.verdict import Change, Discrepancy
+
+
+def differences(
+    observed: SceneGraph, expected: SceneGraph, config: ScoreConfig | None = None
+) -> tuple[Discrepancy, ...]:
+    config = config or ScoreConfig()
+    return compare(observed, expected, config, HashedTextEncoder()).discrepancies
+
+
+def test_no_differences() -> None:
+    assert differences(EXPECTED, EXPECTED) == ()
+    assert differences(SPREAD, TOGETHER) == ()
+
+
+def test_occupied_microwave() -> None:
+    found = differences(OCCUPIED, EXPECTED)
+    assert [d.change for d in found] == [Change.EXTRA_RELATION, Change.EXTRA_OBJECT]
+    assert found[0].subject == "Bowl-1"
+    assert found[0].text == "Bowl-1 is inside Microwave-1; the demonstration shows nothing there"
+    assert found[1].text == "Bowl-1 is here; the demonstration has no Bowl"
+
+
+def test_an_inside_that_the_demonstration_did_not_see_is_not_called_empty() -> None:
+    unseen = SceneGraph(EXPECTED.nodes, EXPECTED.relations, EXPECTED.subtask, ("Microwave-1",))
+    text = differences(OCCUPIED, unseen)[0].text
+    assert "could not be seen" in text
+    assert "nothing" not in text
+
+
+def test_a_changed_state_is_a_state_and_not_two_objects() -> None:
+    found = differences(DIRTY, EXPECTED)
+    assert [(d.change, d.subject) for d in found] == [(Change.STATE, "Plate-1")]
+    assert (found[0].expected, found[0].observed) == ("dirty=clean", "dirty=dirty")
+    assert found == differences(DIRTY, EXPECTED, ScoreConfig(state_changes_match=True))
+    assert differences(CLOSED, EXPECTED)[0].text == (
+        "Microwave-1 is closed; the demonstration shows it open"
+    )
+
+
+def test_dropped_mug() -> None:
+    found = differences(MUG_DROPPED, MUG_HELD)
+    assert [d.change for d in found] == [Change.EXTRA_RELATION, Change.MISSING_RELATION]
+    assert "Mug-1 is not held by the gripper (Mug-1 on top of Floor-1)" in found[1].text
+
+
+def test_blocked_knife_first() -> None:
+    found = differences(BLOCKED, KNIFE)
+    assert found[0].text == "Pot-1 is blocking Knife-1; in the demonstration nothing blocks it"
+    assert Change.EXTRA_OBJECT in {d.change for d in found}
+
+
+def test_missing_things() -> None:
+    expected = scene("Fridge-1; Bowl-1; Bowl-2", "Bowl-2 inside Fridge-1")
+    found = differences(scene("Fridge-1; Bowl-1"), expected)
+    assert [(d.change, d.subject) for d in found] == [
+        (Change.MISSING_RELATION, "Bowl-2"),
+        (Change.MISSING_OBJECT, "Bowl-2"),
+    ]
+    assert found[1].text == "only 1 of Bowl was seen here; the demonstration has Bowl-2"
+
+
+def test_a_closed_inside_is_unobserved_and_not_empty() -> None:
+    expected = scene("Fridge-1; Egg-1", "Egg-1 inside Fridge-1")
+    found = differences(scene("Fridge-1; Egg-1", hidden=("Fridge-1",)), expected)
+    assert [(d.change, d.observed) for d in found] == [(Change.MISSING_RELATION, "unobserved")]

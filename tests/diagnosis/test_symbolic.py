@@ -1,0 +1,272 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from forestall.comparison.preconditions import mine, violations
+from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.planning.domain import Refusal, apply
+from forestall.planning.validate import GraphValidator, observed, unmet
+from forestall.replanning.symbolic import PlannerReplanner
+from forestall.types.facts import Literal, Truth
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Plan, Subtask
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Diagnosis,
+    Precondition,
+    ReplanOutcome,
+    Verdict,
+    Violation,
+)
+from planning.corpus import GOALS, PLANS, VOCABULARY, home_of, scene
+from planning.episodes import context, demonstrations, ground, seen
+
+ALARM = Verdict(Decision.REPLAN, "test", 0.5, 0.9, Calibration.FIXED)
+REASONER = SymbolicReasoner(mine, violations, VOCABULARY)
+
+
+def diagnose(task: str, before: str, where: str, plan: Plan | None = None) -> Diagnosis:
+    """The diagnosis at the first boundary before a subtask of a nominal plan."""
+    steps = plan or PLANS[task]
+    index = steps.texts().index(before)
+    known = demonstrations(task)[PLANS[task].texts().index(before)]
+    state = observed(scene(home_of(task), where), VOCABULARY)
+    graph = seen(state)
+    return REASONER.diagnose(context(task, steps, index, graph, known), ALARM)
+
+
+CAUSES: dict[str, tuple[str, str, str, str, str, tuple[str, ...]]] = {
+    "bowl in the microwave": (
+        "heat-potato",
+        "put_in(Plate, Microwave)",
+        "Potato-1 on Plate-1, Plate-1 held, Bowl-1 in Microwave-1, Microwave-1 is open",
+        "Bowl-1 is inside Microwave-1, which is empty in all 4 demonstrations "
+        "before put_in(Plate, Microwave)",
+        "vacant(Microwave-1)",
+        ("Bowl-1", "Microwave-1"),
+    ),
+    "dirty plate": (
+        "heat-potato",
+        "put_on(Potato, Plate)",
+        "Potato-1 held, Plate-1 is dirty",
+        "Plate-1 is dirty; it was clean in all 4 demonstrations",
+        "dirty(Plate-1)=clean",
+        ("Plate-1",),
+    ),
+    "closed microwave": (
+        "heat-potato",
+        "put_in(Plate, Microwave)",
+        "Potato-1 on Plate-1, Plate-1 held",
+        "Microwave-1 is closed; it was open in all 4 demonstrations",
+        "open(Microwave-1)=open",
+        ("Microwave-1",),
+    ),
+    "dropped mug": (
+        "make-coffee",
+        "put_in(Mug, CoffeeMachine)",
+        "Mug-1 on Floor-1",
+        "the gripper is empty; it held Mug-1 in all 4 demonstrations",
+        "held_by(Mug-1, gripper)",
+        ("Mug-1",),
+    ),
+    "cup in the coffee machine": (
+        "make-coffee",
+        "put_in(Mug, CoffeeMachine)",
+        "Mug-1 held, Cup-1 in CoffeeMachine-1",
+        "Cup-1 is inside CoffeeMachine-1, which is empty",
+        "vacant(CoffeeMachine-1)",
+        ("Cup-1", "CoffeeMachine-1"),
+    ),
+    "potato in the pan": (
+        "cook-egg",
+        "pick_up(Pan)",
+        "Egg-1 on CounterTop-1, StoveBurner-1 is on, Potato-1 in Pan-1",
+        "Potato-1 is inside Pan-1, which is empty",
+        "vacant(Pan-1)",
+        ("Potato-1", "Pan-1"),
+    ),
+    "wine in the bowl": (
+        "make-salad",
+        "navigate_to_obj(Bowl)",
+        "Lettuce-1 held, Bowl-1 is wine",
+        "Bowl-1 is filled with wine; it was empty in all 4 demonstrations",
+        "filled(Bowl-1)=empty",
+        ("Bowl-1",),
+    ),
+    "blocked knife": (
+        "toast-bread",
+        "pick_up(Knife)",
+        "Pot-1 on CounterTop-1, Pot-1 blocks Knife-1",
+        "Pot-1 stands in front of Knife-1; nothing did in all 4 demonstrations",
+        "unblocked(Knife-1)",
+        ("Pot-1", "Knife-1"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", sorted(CAUSES))
+def test_the_cause_names_the_thing(name: str) -> None:
+    task, before, where, cause, fact, culprits = CAUSES[name]
+    found = diagnose(task, before, where)
+    assert cause in found.cause
+    assert Literal.parse(fact) in found.must_change
+    assert found.culprits[: len(culprits)] == culprits
+    assert found.producer == "preconditions"
+
+
+def test_what_held_in_the_demonstrations_and_holds_now_must_stay() -> None:
+    found = diagnose(*CAUSES["bowl in the microwave"][:3])
+    assert found.must_change == (Literal("vacant", ("Microwave-1",)),)
+    for fact in ("held_by(Plate-1, gripper)", "open(Microwave-1)=open", "dirty(Plate-1)=clean"):
+        assert Literal.parse(fact) in found.must_stay
+
+
+@pytest.mark.parametrize("task", sorted(PLANS))
+def test_undisturbed_runs_have_nothing_to_change(task: str) -> None:
+    known = demonstrations(task)
+    state = observed(scene(home_of(task)), VOCABULARY)
+    for index, subtask in enumerate(PLANS[task].subtasks):
+        graph = seen(state)
+        found = REASONER.diagnose(context(task, PLANS[task], index, graph, known[index]), ALARM)
+        assert found.must_change == (), f"{subtask}: {found.cause}"
+        assert "nothing that held before" in found.cause
+        after = apply(state, subtask)
+        assert not isinstance(after, Refusal)
+        state = after
+
+
+def test_unobserved_facts_do_not_alarm() -> None:
+    graph = scene(home_of("heat-potato"), "Potato-1 held, Plate-1 unseen dirty")
+    index = PLANS["heat-potato"].texts().index("put_on(Potato, Plate)")
+    known = demonstrations("heat-potato")[index]
+    found = REASONER.diagnose(
+        context("heat-potato", PLANS["heat-potato"], index, graph, known), ALARM
+    )
+    assert found.must_change == ()
+
+
+def test_no_demonstration_is_said() -> None:
+    graph = scene(home_of("heat-potato"))
+    found = REASONER.diagnose(context("heat-potato", PLANS["heat-potato"], 0, graph), ALARM)
+    assert found.must_change == ()
+    assert "no demonstration" in found.cause
+
+
+def scripted(lifted: str, ground_fact: str, support: int = 4) -> Diagnosis:
+    """The diagnosis of one scripted violation in a kitchen scene."""
+    rule = Precondition("put_in", Literal.parse(lifted), support, 4)
+
+    def mined(references: object, vocabulary: object, **_: object) -> Sequence[Precondition]:
+        return (rule,)
+
+    def broken(
+        preconditions: Sequence[Precondition], graph: SceneGraph, subtask: Subtask
+    ) -> Sequence[Violation]:
+        return (Violation(rule, Literal.parse(ground_fact), Truth.FALSE),)
+
+    graph = scene(home_of("make-coffee"), "Cup-1 held, Potato-1 on Plate-1, Mug-1 is hot")
+    index = PLANS["make-coffee"].texts().index("put_in(Mug, CoffeeMachine)")
+    known = demonstrations("make-coffee", 1)[index]
+    reasoner = SymbolicReasoner(mined, broken, VOCABULARY)
+    return reasoner.diagnose(
+        context("make-coffee", PLANS["make-coffee"], index, graph, known), ALARM
+    )
+
+
+@pytest.mark.parametrize(
+    ("lifted", "fact", "cause"),
+    [
+        ("hand_empty()", "hand_empty()", "the gripper holds Cup-1; it was empty"),
+        (
+            "held_by(?object, gripper)",
+            "held_by(Mug-1, gripper)",
+            "the gripper holds Cup-1; it held",
+        ),
+        ("not held_by(?object, gripper)", "not held_by(Cup-1, gripper)", "it did not hold Cup-1"),
+        ("accessible(?object)", "accessible(Egg-1)", "Egg-1 is inside Fridge-1, which is closed"),
+        ("located(?object)", "located(Mug-1)", "the place of Mug-1 is not known"),
+        ("inside(?object, Bowl)", "inside(Mug-1, Bowl-1)", "Mug-1 is not inside Bowl-1"),
+        (
+            "not on_top_of(?object, Plate)",
+            "not on_top_of(Potato-1, Plate-1)",
+            "Potato-1 is on top of Plate-1; it was not",
+        ),
+        ("toggled(?target)=on", "toggled(Faucet-1)=on", "Faucet-1 is off; it was on"),
+        ("temperature(?object)=room", "temperature(Mug-1)=room", "Mug-1 is hot; it was at room"),
+        ("vacant(?target)", "vacant(Plate-1)", "Potato-1 is on top of Plate-1, which is empty"),
+    ],
+)
+def test_causes_are_readable(lifted: str, fact: str, cause: str) -> None:
+    assert cause in scripted(lifted, fact).cause
+
+
+def test_support_is_told() -> None:
+    found = scripted("dirty(?object)=clean", "dirty(Mug-1)=clean", support=3)
+    assert "in 3 of 4 demonstrations" in found.cause
+
+
+def test_where_a_thing_happens_to_stand_is_no_need() -> None:
+    found = scripted("on_top_of(?object, CounterTop)", "on_top_of(Mug-1, CounterTop)")
+    assert found.must_change == ()
+
+
+SCENARIOS: dict[str, tuple[str, str, str | None]] = {
+    "microwave-occupied": ("heat-potato", "Bowl-1 in Microwave-1", None),
+    "plate-dirty": ("heat-potato", "Plate-1 is dirty", None),
+    "microwave-left-closed": ("heat-potato", "", "open_obj(Microwave)"),
+    "coffee-machine-occupied": ("make-coffee", "Cup-1 in CoffeeMachine-1", None),
+    "mug-dropped": ("make-coffee", "", None),
+    "pan-dirty": ("cook-egg", "Pan-1 is dirty", None),
+    "potato-in-pan": ("cook-egg", "Potato-1 in Pan-1", None),
+    "burner-occupied": ("boil-water", "Pan-1 on StoveBurner-4", None),
+    "bowl-filled-with-wine": ("make-salad", "Bowl-1 is wine", None),
+    "knife-blocked": ("toast-bread", "Pot-1 on CounterTop-1, Pot-1 blocks Knife-1", None),
+}
+
+
+@pytest.mark.parametrize("name", sorted(SCENARIOS))
+def test_diagnosis_and_repair_save_the_task(name: str) -> None:
+    """The whole chain on symbolic states: diagnose before each subtask, repair, go on."""
+    task, where, dropped = SCENARIOS[name]
+    steps = Plan(tuple(s for s in PLANS[task].subtasks if str(s) != dropped))
+    known = demonstrations(task)
+    nominal = PLANS[task].texts()
+    replanner = PlannerReplanner(GraphValidator(VOCABULARY), VOCABULARY)
+    states = [observed(scene(home_of(task), where), VOCABULARY)]
+    index = repairs = 0
+    fault = name == "mug-dropped"
+    while index < len(steps):
+        state = states[-1]
+        if fault and str(steps.subtasks[index]) == "put_in(Mug, CoffeeMachine)":
+            fault = False
+            put = state.copy()
+            put.held = None
+            put.places["Mug-1"] = next(
+                iter(observed(scene("Mug-1 on Floor-1"), VOCABULARY).places.values())
+            )
+            states[-1] = state = put
+        text = str(steps.subtasks[index])
+        left = len(steps) - index
+        same = [i for i, t in enumerate(nominal) if t == text]
+        near = min(same, key=lambda i: abs(len(nominal) - i - left), default=None)
+        if near is not None:
+            graph = seen(state)
+            here = context(task, steps, index, graph, known[near])
+            diagnosis = REASONER.diagnose(here, ALARM)
+            if diagnosis.must_change:
+                repairs += 1
+                assert repairs <= 3, diagnosis.cause
+                answer = replanner.replan(here, diagnosis)
+                assert answer.outcome is ReplanOutcome.SOLVED, (diagnosis.cause, answer.note)
+                assert answer.plan is not None
+                steps, index = answer.plan, 0
+                continue
+        after = apply(state, ground(state, steps.subtasks[index]))
+        assert not isinstance(after, Refusal), f"{text}: {after}"
+        states.append(after)
+        index += 1
+    assert repairs >= 1
+    assert unmet(tuple(states), GOALS[task]) == ()

@@ -1,0 +1,279 @@
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from demonstration_samples import demonstration, with_id
+
+from forestall.errors import InputError, MemoryFileError
+from forestall.memory.codec import DamageError, decode, encode
+from forestall.memory.store import SCHEMA_VERSION, SqliteStore, open_store
+
+PLAN = ("navigate_to_obj(Mug-1)", "pick_up(Mug-1)", "put_in(Mug-1, Sink-1)")
+ONE = demonstration("make-coffee", 3, PLAN)
+TWO = demonstration("warm-water", 4, PLAN[:2])
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "demos.db"
+
+
+def filled(path: Path) -> Path:
+    with open_store(path, create=True) as store:
+        store.add(ONE)
+        store.add(TWO)
+    return path
+
+
+def test_what_is_stored_comes_back(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        names = [store.add(d) for d in (TWO, ONE)]
+        assert len(store) == 2
+    with open_store(path) as store:
+        found = store.all()
+    assert [d.id for d in found] == sorted(names)
+    assert [replace(d, id="") for d in found] == [ONE, TWO]
+    assert found[0].steps[2].graph.text() == ONE.steps[2].graph.text()
+    assert hash(found[0].steps[0].whole) == hash(ONE.steps[0].whole)
+
+
+def test_one_file_is_left_when_it_is_closed(path: Path) -> None:
+    filled(path)
+    assert [p.name for p in path.parent.glob("demos*")] == ["demos.db"]
+    moved = path.with_name("moved.db")
+    os.replace(path, moved)
+    with open_store(moved) as store:
+        assert len(store.required()) == 2
+
+
+def test_the_same_run_is_kept_once(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        assert store.add(ONE) == store.add(ONE)
+        assert len(store) == 1
+
+
+def test_an_id_belongs_to_one_demonstration(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        assert store.add(with_id(ONE, "first")) == "first"
+        with pytest.raises(MemoryFileError, match="another demonstration named first"):
+            store.add(with_id(TWO, "first"))
+        assert [d.task for d in store.all()] == ["make-coffee"]
+
+
+def test_digest_tells_contents_apart_and_not_their_order(tmp_path: Path) -> None:
+    digests = []
+    for i, order in enumerate(((ONE, TWO), (TWO, ONE), (ONE,))):
+        with open_store(tmp_path / f"{i}.db", create=True) as store:
+            for d in order:
+                store.add(d)
+            digests.append(store.digest())
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_no_folder_no_file_empty_file(tmp_path: Path) -> None:
+    with pytest.raises(MemoryFileError, match="there is no folder"):
+        open_store(tmp_path / "no" / "demos.db", create=True)
+    with pytest.raises(MemoryFileError, match="does not exist"):
+        open_store(tmp_path / "demos.db")
+    (tmp_path / "empty.db").touch()
+    with pytest.raises(MemoryFileError, match="is an empty file"):
+        open_store(tmp_path / "empty.db")
+    with pytest.raises(MemoryFileError, match="it is a folder"):
+        open_store(tmp_path)
+    assert [p.name for p in tmp_path.iterdir() if p.is_file()] == ["empty.db"]
+
+
+def test_no_demonstrations_where_they_are_needed(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        assert store.all() == []
+        with pytest.raises(MemoryFileError, match="holds no demonstrations: record some"):
+            store.required()
+
+
+@pytest.mark.parametrize("content", [b"SQL", b"not a database at all, but long enough" * 9])
+def test_not_a_sqlite_file(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+    for create in (False, True):
+        with pytest.raises(MemoryFileError, match="not a memory: it is not a SQLite file"):
+            open_store(path, create)
+    assert path.read_bytes() == content
+
+
+def test_somebody_elses_database(path: Path) -> None:
+    with sqlite3.connect(path) as other:
+        other.execute("CREATE TABLE recipes (name TEXT)")
+    other.close()
+    for create in (False, True):
+        with pytest.raises(MemoryFileError, match="not a memory of forestall"):
+            open_store(path, create)
+
+
+def test_another_schema_version(path: Path) -> None:
+    filled(path)
+    with sqlite3.connect(path) as other:
+        other.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
+    other.close()
+    with pytest.raises(MemoryFileError, match=r"has schema version 2, this version .* reads 1"):
+        open_store(path)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.95])
+def test_cut_off_file(path: Path, share: float) -> None:
+    filled(path)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+    with pytest.raises(MemoryFileError, match="damaged"), open_store(path) as store:
+        store.all()
+
+
+def test_overwritten_pages(path: Path) -> None:
+    filled(path)
+    content = bytearray(path.read_bytes())
+    content[4096:12288] = bytes(8192)
+    path.write_bytes(bytes(content))
+    with pytest.raises(MemoryFileError, match="damaged"), open_store(path) as store:
+        store.all()
+
+
+def test_a_changed_cell_does_not_fit_its_hash(path: Path) -> None:
+    filled(path)
+    with sqlite3.connect(path) as other:
+        other.execute("UPDATE steps SET subtask = 'pick_up(Pan-1)' WHERE position = 1")
+    other.close()
+    with open_store(path) as store, pytest.raises(MemoryFileError, match="does not fit its hash"):
+        store.all()
+
+
+@pytest.mark.parametrize("column", ["things", "perception"])
+def test_content_that_cannot_be_read(column: str) -> None:
+    encoded = encode(ONE)
+    bad = replace(encoded, **{column: b"\x00" if column == "things" else "{"})  # type: ignore[arg-type]
+    with pytest.raises(DamageError, match="is damaged"):
+        decode(bad, "x", bad.digest)
+
+
+def test_locked_by_another_writer(path: Path) -> None:
+    filled(path)
+    other = sqlite3.connect(path, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    try:
+        with open_store(path, busy_timeout_s=0.05) as store:
+            assert len(store.all()) == 2, "reading goes on while another writes"
+            with pytest.raises(MemoryFileError, match=r"being written by another process \(waited"):
+                store.add(replace(ONE, seed=9))
+    finally:
+        other.execute("ROLLBACK")
+        other.close()
+    with open_store(path) as store:
+        store.add(replace(ONE, seed=9))
+        assert len(store) == 3
+
+
+def test_read_only(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    filled(path)
+    monkeypatch.setattr("forestall.memory.store.os.access", lambda *_: False)
+    with open_store(path) as store:
+        assert len(store.all()) == 2
+        with pytest.raises(MemoryFileError, match="is read-only"):
+            store.add(replace(ONE, seed=9))
+        with pytest.raises(MemoryFileError, match="is read-only"):
+            store.put_image(np.zeros((2, 2, 3), np.uint8))
+    with pytest.raises(MemoryFileError, match="is read-only"):
+        open_store(path.with_name("new.db"), create=True)
+
+
+def test_a_failed_insert_leaves_nothing(path: Path) -> None:
+    class Broken(SqliteStore):
+        def _insert(self, *arguments: object) -> None:
+            super()._insert(*arguments)  # type: ignore[arg-type]
+            raise sqlite3.OperationalError("database or disk is full")
+
+    filled(path)
+    broken = Broken(path, 1.0, True)
+    with broken, pytest.raises(MemoryFileError, match="no space left"):
+        broken.add(replace(ONE, seed=9))
+    with open_store(path) as store:
+        assert len(store.all()) == 2
+
+
+WRITER = """
+import sys
+sys.path.insert(0, {tests!r})
+from dataclasses import replace
+from demonstration_samples import demonstration
+from forestall.memory.store import open_store
+plan = ["pick_up(Mug-1)", "put_in(Mug-1, Sink-1)"] * 20
+with open_store({path!r}, create=True) as store:
+    for seed in range(10000):
+        store.add(demonstration("t", seed, plan))
+        print(seed, flush=True)
+"""
+
+
+def test_a_writer_killed_in_the_middle_loses_nothing_finished(path: Path) -> None:
+    code = WRITER.format(tests=str(Path(__file__).parent), path=str(path))
+    writer = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert writer.stdout is not None
+    finished = -1
+    while finished < 7:
+        finished = int(writer.stdout.readline())
+    writer.send_signal(signal.SIGKILL)
+    finished = max([finished, *(int(x) for x in writer.stdout.read().splitlines())])
+    writer.wait()
+    writer.stdout.close()
+    with open_store(path) as store:
+        seeds = sorted(d.seed for d in store.all())
+        assert seeds == list(range(len(seeds)))
+        assert len(seeds) > finished
+        assert all(len(d.steps) == 40 for d in store.all())
+        store.add(ONE)
+        assert len(store) == len(seeds) + 1
+
+
+def picture(seed: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    return np.random.default_rng(seed).integers(0, 255, (5, 7, 3), np.uint8)
+
+
+def test_pictures_come_back_and_are_kept_once(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        names = [store.put_image(picture(i)) for i in (0, 1, 0)]
+        assert names[0] == names[2] != names[1]
+        np.testing.assert_array_equal(store.get_image(names[1]), picture(1))
+        files = [p for p in store.images.folder.rglob("*") if p.is_file()]
+        assert sorted(p.stem for p in files) == sorted(set(names))
+        stored = demonstration("t", 1, PLAN, image=names[0])
+        store.add(stored)
+        assert store.all()[0].steps[0].image == names[0]
+
+
+def test_missing_damaged_and_misnamed_pictures(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        with pytest.raises(MemoryFileError, match="is not in"):
+            store.get_image("0" * 32)
+        with pytest.raises(MemoryFileError, match="not the name of a stored picture"):
+            store.get_image("../../etc/passwd")
+        with pytest.raises(InputError, match="uint8"):
+            store.put_image(np.zeros((2, 2, 3), np.float32))  # type: ignore[arg-type]
+        one, two = (store.put_image(picture(i)) for i in range(2))
+        files = {p.stem: p for p in store.images.folder.rglob("*.png")}
+        files[one].write_bytes(files[two].read_bytes())
+        with pytest.raises(MemoryFileError, match="content is not what it says"):
+            store.get_image(one)
+        files[two].write_bytes(files[two].read_bytes()[:40])
+        with pytest.raises(MemoryFileError, match="is damaged"):
+            store.get_image(two)
+
+
+def test_pictures_where_no_folder_can_be(path: Path) -> None:
+    with open_store(path, create=True) as store:
+        store.images.folder.write_text("a file in the way")
+        with pytest.raises(MemoryFileError, match="cannot keep a picture"):
+            store.put_image(picture(0))

@@ -1,0 +1,145 @@
+"""The whole loop on a world without geometry: the true rules, perception replaced by the truth.
+
+What the real pictures add is tested in test_end_to_end.py; here every decision of the loop is
+checked in milliseconds.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from forestall.benchmark.faults import apply_plan_faults, apply_scene_faults, wrap
+from forestall.benchmark.files import load_scenario, load_task, scenario_names, task_names
+from forestall.benchmark.goals import TruthGoalChecker
+from forestall.build import RunConfig, make_strategy
+from forestall.envs.kitchen.environment import KitchenEnvironment
+from forestall.envs.kitchen.flat_world import flat_environment
+from forestall.memory.recording import demonstration_from
+from forestall.perception.config import ScopeConfig
+from forestall.perception.scope import scope
+from forestall.runtime import Runtime, RuntimeConfig
+from forestall.types.demonstration import Demonstration
+from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+from forestall.types.plan import Plan, Subtask
+from forestall.types.verdict import Decision
+from forestall.vocabulary import Vocabulary
+
+ON_FLAT_WORLDS = sorted(set(scenario_names()) - {"knife-blocked"})
+"""A flat world knows no place in front of another, so nothing can be moved out of the way there."""
+
+
+class TruthPerceiver:
+    """Perception that is always right."""
+
+    def __init__(self, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> None:
+        self._kitchen = kitchen
+        self._vocabulary = vocabulary
+
+    def reset(self) -> None:
+        pass
+
+    def perceive(self, observation: Observation) -> SceneGraph:
+        return self._kitchen.oracle.truth()
+
+    def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
+        return scope(graph, subtask, self._vocabulary, ScopeConfig())
+
+    def describe(self) -> Mapping[str, str]:
+        return {"segmenter": "truth", "state_estimator": "truth"}
+
+
+def play(
+    config: RunConfig,
+    demonstrations: list[Demonstration] | None = None,
+    limits: RuntimeConfig | None = None,
+) -> EpisodeRecord:
+    loaded = load_task(config.task)
+    faults = () if config.scenario is None else load_scenario(config.scenario).faults
+    needs = apply_scene_faults(loaded.task.scene, faults, loaded.vocabulary)
+    kitchen = flat_environment(needs, loaded.vocabulary)
+
+    def score(record: EpisodeRecord) -> EpisodeRecord:
+        strict, weak, why = TruthGoalChecker().check(record.task.goal, kitchen.oracle)
+        return replace(record, success=strict, weak_success=weak, failures=why)
+
+    runtime = Runtime(
+        wrap(kitchen, faults, kitchen, loaded.vocabulary),
+        TruthPerceiver(kitchen, loaded.vocabulary),
+        make_strategy(config, loaded.vocabulary, demonstrations),
+        loaded.vocabulary,
+        config=limits,
+    )
+    plan = apply_plan_faults(loaded.task.plan, faults)
+    return runtime.run(loaded.task, plan, config.seed, config.scenario, score)
+
+
+@cache
+def memory() -> list[Demonstration]:
+    """Four demonstrations of each task."""
+    found = []
+    for task in task_names():
+        for seed in range(1000, 1004):
+            record = play(RunConfig(task, strategy="none", seed=seed))
+            demonstration = demonstration_from(record, "test")
+            assert demonstration is not None, (task, seed, record.failures)
+            found.append(replace(demonstration, id=f"{task}-{seed}"))
+    return found
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_undisturbed_runs_succeed_with_and_without_monitor(task: str) -> None:
+    plain = play(RunConfig(task, strategy="none", seed=5))
+    watched = play(RunConfig(task, seed=5), memory())
+    assert plain.success and watched.success
+    assert plain.end is EpisodeEnd.PLAN_FINISHED
+    assert [e.subtask.skill for e in plain.executed] == [s.skill for s in plain.task.plan]
+    assert all(b.replan is None or b.replan.plan is None for b in watched.boundaries)
+
+
+@pytest.mark.parametrize("scenario", ON_FLAT_WORLDS)
+def test_scenarios_fail_unwatched_and_succeed_watched(scenario: str) -> None:
+    task = load_scenario(scenario).task
+    assert play(RunConfig(task, scenario, "none", seed=3)).success is False
+    watched = play(RunConfig(task, scenario, seed=3), memory())
+    assert watched.success, watched.failures
+    assert any(b.replan is not None and b.replan.plan is not None for b in watched.boundaries)
+
+
+def test_the_alarm_comes_before_the_subtask_and_names_the_cause() -> None:
+    record = play(RunConfig("heat-potato", "microwave-occupied", seed=3), memory())
+    alarms = [
+        b
+        for b in record.boundaries
+        if b.verdict is not None and b.verdict.decision is Decision.REPLAN and b.diagnosis
+    ]
+    first = alarms[0]
+    assert first.diagnosis is not None
+    assert "Bowl-1" in first.diagnosis.cause
+    assert "Bowl-1" in first.diagnosis.culprits
+    placed = next(e for e in record.executed if str(e.subtask) == "put_in(Plate-1, Microwave-1)")
+    assert first.index < placed.index
+    assert placed.outcome.status is SkillStatus.SUCCEEDED
+    assert "pick_up(Bowl-1)" in [str(e.subtask) for e in record.executed]
+
+
+def test_a_run_is_the_same_twice() -> None:
+    one, two = (play(RunConfig("cook-egg", "pan-dirty", seed=3), memory()) for _ in range(2))
+    assert [str(e.subtask) for e in one.executed] == [str(e.subtask) for e in two.executed]
+    assert [b.graph for b in one.boundaries] == [b.graph for b in two.boundaries]
+
+
+def test_limits_end_an_episode() -> None:
+    short = play(RunConfig("make-salad", strategy="none"), limits=RuntimeConfig(max_subtasks=3))
+    assert short.end is EpisodeEnd.SUBTASK_LIMIT
+    assert len(short.executed) == 3
+    never = play(
+        RunConfig("heat-potato", "microwave-left-closed", seed=3),
+        memory(),
+        RuntimeConfig(max_replans=0),
+    )
+    assert never.success is False
+    assert never.initial_plan != Plan(never.task.plan.subtasks)
