@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from forestall.planning.pddl import GOAL, Pddl, export
-from forestall.planning.planner import with_driving
-from forestall.planning.planner import pose
+from forestall.planning.planner import pose, with_driving
 from forestall.planning.problem import Problem
 from forestall.planning.relevance import alternatives
 from forestall.planning.search import SearchOutcome, solve
@@ -50,8 +49,8 @@ def test_labels_are_unique_and_name_their_subtask() -> None:
     assert found is not None
     text = export(found[1])
     assert len(text.actions) == len(found[1].operators)
-    assert str(text.actions["pick_up_knife-1"]) == "pick_up(Knife-1)"
-    assert text.read_plan(["pick_up_knife-1", "reach-goal-1"])[0].skill == "pick_up"
+    assert str(text.actions["pick_up_knife-1"].subtask) == "pick_up(Knife-1)"
+    assert text.read_plan(["pick_up_knife-1", "reach-goal-1"])[0].subtask.skill == "pick_up"
 
 
 def fast_downward(text: Pddl, folder: Path) -> list[str] | None:
@@ -94,11 +93,7 @@ def test_fast_downward_agrees(name: str, tmp_path: Path) -> None:
     assert (theirs is not None) == (ours.outcome is SearchOutcome.SOLVED)
     if theirs is None:
         return
-    over = {label: o.over for label, o in zip(text.actions, ordered(problem, text), strict=True)}
-    steps = [(text.actions[n], over[n]) for n in theirs if n in text.actions]
-    subtasks, final, why = with_driving(state, steps)
+    subtasks, final, why = with_driving(state, text.read_plan(theirs))
     assert final is not None, why
-    check = GraphValidator(VOCABULARY).check(
-        Plan(subtasks), scene(POSED[name][0]), POSED[name][1]
-    )
+    check = GraphValidator(VOCABULARY).check(Plan(subtasks), scene(POSED[name][0]), POSED[name][1])
     assert check.ok, check.reason

@@ -53,7 +53,10 @@ class ScoreConfig:
     Args:
         feature: what a node's feature encodes.
         state_weight: share of the states in the feature "parts".
-        floor: a pair of nodes below this cosine stays unmatched.
+        floor: a pair of nodes below this cosine stays unmatched. With "parts" and hashed words the
+            same category scores 0.85 or more whatever its states, another one 0.8 or less; with
+            "text" a lower floor is needed for changed states to match.
+        subtask_floor: the same for the two subtask nodes.
         state_changes_match: whether a node may match one of the same category whose known states
             differ; unobserved states agree with anything.
         attributes: states that count. Temperature does not: a camera cannot see it.
@@ -77,8 +80,9 @@ class ScoreConfig:
     """
 
     feature: Feature = Feature.PARTS
-    state_weight: float = 0.3
-    floor: float = 0.6
+    state_weight: float = 0.15
+    floor: float = 0.8
+    subtask_floor: float = 0.6
     state_changes_match: bool = False
     attributes: tuple[str, ...] = tuple(a for a in ATTRIBUTES if a != "temperature")
     subtask_node: bool = True
@@ -97,8 +101,9 @@ class ScoreConfig:
     def __post_init__(self) -> None:
         if not (self.use_node or self.use_edge or self.use_structure):
             raise InputError("at least one of use_node, use_edge, use_structure must be on")
-        if not 0 < self.floor <= 1:
-            raise InputError(f"floor {self.floor} is not above 0 and at most 1")
+        for floor in (self.floor, self.subtask_floor):
+            if not 0 < floor <= 1:
+                raise InputError(f"floor {floor} is not above 0 and at most 1")
         if not 0 <= self.state_weight < 1:
             raise InputError(f"state_weight {self.state_weight} is not at least 0 and below 1")
         for predicate in self.predicates:

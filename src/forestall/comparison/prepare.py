@@ -110,7 +110,8 @@ class LabelTable:
         config = self._config
         if isinstance(a, str) or isinstance(b, str):
             both = isinstance(a, str) and isinstance(b, str)
-            return self._floored(self._cosine(str(a), str(b))) if both else 0.0
+            cosine = self._cosine(str(a), str(b)) if both else 0.0
+            return self._floored(cosine, config.subtask_floor)
         if a[2] != b[2] or (a[0] == GRIPPER) != (b[0] == GRIPPER):
             return 0.0
         common = {k for k, _ in a[1]} & {k for k, _ in b[1]}
@@ -119,17 +120,17 @@ class LabelTable:
             return 0.0
         if config.feature is Feature.TEXT:
             texts = (_label_text(a[0], states_a), _label_text(b[0], states_b))
-            return self._floored(self._cosine(*texts))
+            return self._floored(self._cosine(*texts), config.floor)
         share = config.state_weight
         kind = (1.0 - share) * self._cosine(a[0], b[0])
         if kind + share < config.floor - QUANTUM:
             return 0.0
         states = share * self._cosine(", ".join(states_a), ", ".join(states_b))
-        return self._floored(kind + states)
+        return self._floored(kind + states, config.floor)
 
-    def _floored(self, cosine: float) -> float:
+    def _floored(self, cosine: float, floor: float) -> float:
         rounded = min(round(cosine / QUANTUM) * QUANTUM, 1.0)
-        return rounded if rounded >= self._config.floor else 0.0
+        return rounded if rounded >= floor else 0.0
 
     def _cosine(self, a: str, b: str) -> float:
         if a == b:

@@ -24,6 +24,7 @@ Vectors = npt.NDArray[np.float32]
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _SUFFIXES = ("ing", "ed", "es", "s")
 _NGRAM_SIZES = (3, 4, 5)
+_WORD_SLOTS = 8
 
 
 @lru_cache(maxsize=8192)
@@ -47,14 +48,14 @@ def _slot(feature: str, dimensions: int) -> tuple[int, float]:
 class HashedTextEncoder:
     """Texts → unit rows, by hashing (implements `TextEncoder`).
 
-    A text is the sum of its words' vectors. A word's vector is one signed slot for the word itself
-    and, together as heavy as `ngram_weight`, one for each character n-gram of 3 to 5 letters of
-    "<word>", so that related spellings stay close. A text without any word gets a fixed unit
+    A text is the sum of its words' vectors. A word's vector has a few signed slots for the word
+    itself (so that two words seldom share them all) and, together as heavy as `ngram_weight`, one
+    for each character n-gram of 3 to 5 letters of "<word>", so that related spellings stay close. A text without any word gets a fixed unit
     vector of its own.
 
     Args:
         dimensions: length of a row.
-        ngram_weight: length of the n-gram part relative to the word's own slot.
+        ngram_weight: length of the n-gram part relative to the word's own part.
         cache_size: how many texts are remembered.
     """
 
@@ -108,8 +109,9 @@ class HashedTextEncoder:
         length = float(np.sqrt(row @ row))
         if length > 0:
             row *= np.float32(self.ngram_weight / length)
-        slot, sign = _slot(word, self.dimensions)
-        row[slot] += sign
+        for k in range(_WORD_SLOTS):
+            slot, sign = _slot(f"{k}{word}", self.dimensions)
+            row[slot] += np.float32(sign * _WORD_SLOTS**-0.5)
         _remember(self._words, word, row, self._cache_size)
         return row
 

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from forestall.planning.problem import Operator, Problem
-from forestall.types.plan import Subtask
 
 GOAL = "goal-reached"
 
@@ -22,10 +21,10 @@ class Pddl:
 
     domain: str
     problem: str
-    actions: dict[str, Subtask]
+    actions: dict[str, Operator]
 
-    def read_plan(self, names: Iterable[str]) -> tuple[Subtask, ...]:
-        """The subtasks of a plan given as action names (goal operators are left out)."""
+    def read_plan(self, names: Iterable[str]) -> tuple[Operator, ...]:
+        """The operators of a plan given as action names (those that reach a goal are left out)."""
         return tuple(self.actions[n.lower()] for n in names if n.lower() in self.actions)
 
 
@@ -43,6 +42,7 @@ def export(problem: Problem, name: str = "household") -> Pddl:
     for k, goal in enumerate(problem.goals):
         lines += [
             f"  (:action reach-goal-{k + 1}",
+            "    :parameters ()",
             f"    :precondition {_all(goal, labels)}",
             f"    :effect ({GOAL})",
             "  )",
@@ -58,8 +58,7 @@ def export(problem: Problem, name: str = "household") -> Pddl:
         f"  (:goal ({GOAL}))",
         ")",
     ]
-    meaning = {label: operator.subtask for label, operator in named}
-    return Pddl("\n".join(lines) + "\n", "\n".join(text) + "\n", meaning)
+    return Pddl("\n".join(lines) + "\n", "\n".join(text) + "\n", dict(named))
 
 
 def _labels(names: Iterable[str]) -> list[str]:
@@ -97,6 +96,7 @@ def _action(label: str, operator: Operator, labels: list[str]) -> list[str]:
         effects.append(f"      {text}")
     return [
         f"  (:action {label}",
+        "    :parameters ()",
         f"    :precondition {_all(operator.condition, labels)}",
         "    :effect (and",
         *sorted(effects),

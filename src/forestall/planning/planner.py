@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from forestall.planning.domain import Refusal, State, apply
-from forestall.planning.problem import Problem
+from forestall.planning.problem import Operator, Problem
 from forestall.planning.relevance import Conjunction, alternatives, universe
 from forestall.planning.search import SearchConfig, SearchOutcome, solve
 from forestall.planning.translate import UnsupportedError, translate
@@ -62,7 +62,7 @@ def plan_to(
         named = {a for goal in goals for x in goal for a in x.args}
         loose = frozenset(x for x in kept.supports if x not in named)
         steps = [problem.operators[i] for i in found.steps]
-        subtasks, final, note = _with_driving(state, [(o.subtask, o.over) for o in steps], loose)
+        subtasks, final, note = with_driving(state, steps, loose)
         if final is None:
             outcome = ReplanOutcome.REJECTED
     elif outcome is ReplanOutcome.UNSOLVABLE:
@@ -92,8 +92,8 @@ def pose(state: State, goals: Sequence[Conjunction], also: Iterable[str] = ()) -
     return translate(state, goals, universe(state, goals, also))
 
 
-def _with_driving(
-    state: State, steps: Sequence[tuple[Subtask, str | None]], loose: frozenset[str]
+def with_driving(
+    state: State, operators: Sequence[Operator], loose: frozenset[str] = frozenset()
 ) -> tuple[tuple[Subtask, ...], State | None, str]:
     """Insert navigation, executing along; the final state is None if a step does not run.
 
@@ -101,7 +101,8 @@ def _with_driving(
     """
     plan: list[Subtask] = []
     where: str | None = None
-    for subtask, over in steps:
+    for operator in operators:
+        subtask, over = operator.subtask, operator.over
         subject = over or subtask.args[-1]
         place = state.root(subject)
         device = state.category(subject).device

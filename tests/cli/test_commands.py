@@ -1,0 +1,106 @@
+"""The command line without pictures: listings, comparison, errors and exit codes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from forestall.cli.main import call
+from forestall.types.facts import GRIPPER
+from forestall.types.graph import ObjectNode, Relation, SceneGraph
+from forestall.types.plan import Subtask
+
+
+def graph_file(folder: Path, name: str, *, bowl: bool) -> str:
+    nodes = [
+        ObjectNode("Microwave-1", "Microwave", (("open", "open"),)),
+        ObjectNode("Plate-1", "Plate", (("dirty", "clean"),)),
+        ObjectNode(GRIPPER, "Gripper"),
+    ]
+    relations = [Relation("Plate-1", "held_by", GRIPPER)]
+    if bowl:
+        nodes.append(ObjectNode("Bowl-1", "Bowl"))
+        relations.append(Relation("Bowl-1", "inside", "Microwave-1"))
+    graph = SceneGraph(
+        tuple(nodes), tuple(relations), Subtask.parse("put_in(Plate-1, Microwave-1)")
+    )
+    path = folder / name
+    path.write_text(json.dumps(graph.to_json()))
+    return str(path)
+
+
+def test_listings_are_complete(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["tasks", "--json"]) == 0
+    tasks = json.loads(capsys.readouterr().out)
+    assert len(tasks) == 10 and all(t["plan"] and t["literals"] for t in tasks)
+    assert call(["scenarios", "--task", "heat-potato", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert {r["task"] for r in rows} == {"heat-potato"} and len(rows) >= 3
+    assert call(["scenarios"]) == 0
+    assert "mug-dropped" in capsys.readouterr().out
+    assert call(["scenarios", "--schema"]) == 0
+    assert "faults" in json.loads(capsys.readouterr().out)["properties"]
+
+
+def test_compare_prints_score_and_difference(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = graph_file(tmp_path, "a.json", bowl=True)
+    two = graph_file(tmp_path, "b.json", bowl=False)
+    assert call(["compare", one, two, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert 0 < data["score"] < 0.9
+    assert any("Bowl-1 is inside Microwave-1" in d["text"] for d in data["discrepancies"])
+    assert call(["compare", one, one]) == 0
+    assert capsys.readouterr().out.startswith("score 1.000")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["run", "heat-potatoe"], "did you mean heat-potato"),
+        (["run", "heat-potato", "--scenario", "mug-droped"], "did you mean mug-dropped"),
+        (["run", "heat-potato", "--scenario", "mug-dropped"], "is for the task make-coffee"),
+        (["run", "heat-potato", "--strategy", "psychic"], "known: none, proactive"),
+        (["run", "heat-potato", "--seed", "-1"], "seed -1"),
+        (["run", "heat-potato", "--threshold", "2"], "threshold 2"),
+        (["run", "heat-potato", "--sed", "1"], "--seed"),
+        (["rnu"], "run"),
+        (["tasks", "extra"], "extra"),
+        (["compare", "absent.json", "absent.json"], "cannot read scene graph"),
+        (["demos", "record", "x.db", "--kitchens", "0"], "at least 1"),
+        (["demos", "list", "absent.db"], "absent.db"),
+        (["bench", "speed", "--repeat", "0"], "at least 1"),
+    ],
+)
+def test_wrong_input_is_one_clear_line(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert call(arguments) in (2, 3)
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("forestall: error: ")
+    assert printed.err.count("\n") == 1
+    assert says in printed.err
+
+
+def test_a_dangling_relation_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.json"
+    data = json.loads(Path(graph_file(tmp_path, "ok.json", bowl=True)).read_text())
+    data["relations"].append(["Bowl-1", "inside", "Oven-1"])
+    path.write_text(json.dumps(data))
+    assert call(["compare", str(path), str(path)]) == 2
+    assert "Oven-1" in capsys.readouterr().err
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from forestall.cli.main import call; call(['--help']);"
+        "heavy = {'numpy', 'scipy', 'mujoco', 'pydantic', 'PIL', 'networkx'} & set(sys.modules);"
+        "sys.exit(f'imported: {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "run" in done.stdout
