@@ -183,6 +183,13 @@ def test_one_demonstration_is_not_enough() -> None:
     assert mine([], VOCABULARY) == ()
 
 
+def test_two_steps_of_one_run_are_one_demonstration() -> None:
+    twice = [HEAT[0], replace(HEAT[0], index=3)]
+    assert mine(twice, VOCABULARY) == ()
+    found = mine([*twice, HEAT[1]], VOCABULARY)
+    assert {(p.support, p.total) for p in found} == {(2, 2)}
+
+
 def test_other_kinds_of_arguments_teach_only_what_the_skill_needs() -> None:
     refs = references(
         "heat-potato", 1, *[scene("gripper; Plate-1 dirty=clean", "", "pick_up(Plate-1)")] * 4

@@ -98,6 +98,21 @@ def test_what_the_demonstrations_had_not_located_is_not_looked_for(
     assert verdict.decision is Decision.REPLAN
 
 
+def test_a_reference_that_had_not_found_the_argument_cannot_judge(
+    observation: Observation,
+) -> None:
+    blind = reference(graph("Sink-1"), "blind")
+    verdict = detector().judge(graph("Mug-1", "Sink-1"), observation, [blind])
+    assert verdict.decision is Decision.PROCEED
+    assert verdict.score is None
+    assert verdict.references == 1
+    assert verdict.note == "no reference had found Mug-1 at this point, so nothing was judged"
+    seeing = reference(graph("Mug-1", "Pan-1", "Pot-1"), "seeing")
+    verdict = detector().judge(graph("Mug-1", "Sink-1"), observation, [blind, seeing])
+    assert verdict.nearest is seeing
+    assert verdict.decision is Decision.REPLAN
+
+
 def test_threshold_is_checked() -> None:
     with pytest.raises(InputError, match="between 0 and 1"):
         DetectorConfig(threshold=90)

@@ -43,8 +43,10 @@ CAUSES: dict[str, tuple[str, str, str, str, str, tuple[str, ...]]] = {
         "heat-potato",
         "put_in(Plate, Microwave)",
         "Potato-1 on Plate-1, Plate-1 held, Bowl-1 in Microwave-1, Microwave-1 is open",
-        "Bowl-1 is inside Microwave-1, which is empty in all 4 demonstrations "
-        "before put_in(Plate, Microwave)",
+        (
+            "Bowl-1 is inside Microwave-1, which is empty in all 4 demonstrations "
+            "before put_in(Plate, Microwave)"
+        ),
         "vacant(Microwave-1)",
         ("Bowl-1", "Microwave-1"),
     ),

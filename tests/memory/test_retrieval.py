@@ -57,10 +57,11 @@ def test_the_same_step_of_the_same_task_comes_first() -> None:
 
 
 def test_less_similar_steps_come_later_with_their_similarity() -> None:
-    found = retriever().retrieve(Subtask.parse("pick_up(Mug-1)"), "make-coffee", 1)
+    found = retriever(floor=0.5).retrieve(Subtask.parse("pick_up(Mug-1)"), "make-coffee", 1)
     assert [r.similarity for r in found[:5]] == [1.0] * 5
     assert found[-1].demonstration == "s"
-    assert 0.6 <= found[-1].similarity < 0.8
+    assert 0.5 <= found[-1].similarity < 0.8
+    assert "s" not in {name for name, _ in order("pick_up(Mug-1)", "make-coffee", 1)}
 
 
 def test_k_and_steps_per_demonstration() -> None:
@@ -80,7 +81,8 @@ def test_only_the_same_skill_unless_asked() -> None:
 
 
 def test_put_on_and_put_in_are_one_skill() -> None:
-    assert ("c1", 4) in order("put_on(Mug-1, CoffeeMachine-1)", "make-coffee", 4)
+    found = retriever().retrieve(Subtask.parse("put_on(Mug-1, CoffeeMachine-1)"), "make-coffee", 4)
+    assert [(r.index, r.similarity) for r in found] == [(4, 1.0), (4, 1.0)]
 
 
 def test_later_is_the_rest_of_that_run() -> None:
@@ -91,7 +93,7 @@ def test_later_is_the_rest_of_that_run() -> None:
 
 
 def test_numbers_are_stripped() -> None:
-    assert subtask_words(Subtask.parse("put_on(Pot-2, StoveBurner-4)")) == "put on Pot StoveBurner"
+    assert subtask_words(Subtask.parse("put_on(Pot-2, StoveBurner-4)")) == "put Pot StoveBurner"
 
 
 def test_from_a_store(tmp_path: Path) -> None:

@@ -334,6 +334,28 @@ GOALS: dict[str, Goal] = {
 }
 
 
+def together(*tasks: str) -> Goal:
+    """Several tasks of the corpus as one large goal."""
+    variables, literals, never = [], [], []
+    for task in tasks:
+        wanted = GOALS[task]
+        names = {v: f"{v}_{task}" for v, _ in wanted.variables}
+        variables += [(names[v], c) for v, c in wanted.variables]
+        literals += [x.bind(names) for x in wanted.literals]
+        never += [x.bind(names) for x in wanted.never]
+    return Goal(" and ".join(tasks), tuple(variables), tuple(literals), tuple(never))
+
+
+LARGE = together("make-salad", "make-coffee", "boil-water", "toast-bread")
+LARGE_SCENE = (
+    KITCHEN
+    + """
+    Bowl-1 is wine, Bowl-1 is dirty, Mug-1 is dirty, Cup-1 in CoffeeMachine-1
+    Pan-1 on StoveBurner-4, Pot-1 on CounterTop-1, Pot-1 blocks Knife-1
+"""
+)
+
+
 def home_of(task: str) -> str:
     """The scene text of a task."""
     return LIVING_ROOM if task == "switch-devices" else KITCHEN

@@ -14,12 +14,13 @@ from forestall.planning.state import State
 from forestall.planning.validate import GraphValidator, observed
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
-from planning.corpus import GOALS, KITCHEN, VOCABULARY, home_of, scene
+from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, VOCABULARY, home_of, scene
 from planning.test_search import DISTURBED, UNSOLVABLE
 
 POSED: dict[str, tuple[str, Goal]] = {
     **{t: (home_of(t), g) for t, g in GOALS.items()},
     **{f"{t}, disturbed": (home_of(t) + "," + DISTURBED[t], g) for t, g in GOALS.items()},
+    "large": (LARGE_SCENE, LARGE),
     **{n: (KITCHEN + "," + where, g) for n, (where, g) in UNSOLVABLE.items()},
 }
 

@@ -15,7 +15,7 @@ from forestall.types.facts import Literal
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
 from forestall.types.verdict import ReplanOutcome
-from planning.corpus import GOALS, KITCHEN, VOCABULARY, goal, home_of, scene
+from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, VOCABULARY, goal, home_of, scene
 
 DISTURBED = {
     "heat-potato": "Bowl-1 in Microwave-1, Plate-1 is dirty, Apple-1 on Plate-1",
@@ -105,6 +105,14 @@ def test_planning_from_scratch_reaches_the_goal(task: str, disturbed: bool) -> N
     assert planned.outcome is ReplanOutcome.SOLVED, planned.note
     check = GraphValidator(VOCABULARY).check(Plan(planned.subtasks), graph, GOALS[task])
     assert check.ok, check.reason
+
+
+def test_a_large_goal_is_planned_and_checks_out() -> None:
+    graph = scene(LARGE_SCENE)
+    planned = plan_goal(observed(graph, VOCABULARY), LARGE)
+    assert planned.outcome is ReplanOutcome.SOLVED
+    assert len([s for s in planned.subtasks if s.skill != "navigate_to_obj"]) > 40
+    assert GraphValidator(VOCABULARY).check(Plan(planned.subtasks), graph, LARGE).ok
 
 
 UNSOLVABLE: dict[str, tuple[str, Goal]] = {

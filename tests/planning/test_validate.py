@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import pytest
 
-from planning.corpus import GOALS, PLANS, VOCABULARY, WRONG, Wrong, goal, home_of, plan, scene
 from forestall.planning.domain import Refusal, apply
 from forestall.planning.validate import GraphValidator, observed, run
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
+from planning.corpus import GOALS, PLANS, VOCABULARY, WRONG, Wrong, goal, home_of, plan, scene
 
 CHECK = GraphValidator(VOCABULARY).check
 

@@ -18,7 +18,15 @@ import numpy.typing as npt
 from forestall.comparison.discrepancy import differences
 from forestall.comparison.matching import assign, match, parts, weights
 from forestall.comparison.options import DegreeScale, EmptyRule, ScoreConfig, StructureCount
-from forestall.comparison.prepare import QUANTUM, Floats, Ints, LabelTable, Prepared, prepare
+from forestall.comparison.prepare import (
+    QUANTUM,
+    Floats,
+    Ints,
+    LabelTable,
+    Prepared,
+    prepare,
+    tie_values,
+)
 from forestall.interfaces import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Calibration, Decision, Reference, ScoreParts, Verdict
@@ -216,22 +224,22 @@ def _partners(observed: Prepared, stack: _Stack, padded: Floats) -> tuple[Ints, 
     if size == 0:
         return np.zeros((count, 0), dtype=np.int64), np.zeros(count)
     similarity = padded[observed.labels][:, stack.labels].transpose(1, 0, 2)  # (R, n, M)
-    role = (observed.roles[:, None] == stack.roles[:, None]) & (stack.roles[:, None] > 0)
-    both = np.bitwise_count(observed.around[:, None] & stack.around[:, None]).astype(np.int64)
-    any_ = np.bitwise_count(observed.around[:, None] | stack.around[:, None]).astype(np.int64)
-    same = observed.numbers[:, None] == stack.numbers[:, None]
-    tie = 512 * role + 2 * ((255 * (both + 1)) // (any_ + 1)) + 1 * same
-    weight = weights(similarity, tie.astype(np.float64))
+    r, i, j = np.nonzero(similarity)
+    role = (observed.roles[i] == stack.roles[r, j]) & (observed.roles[i] > 0)
+    same = observed.numbers[i] == stack.numbers[r, j]
+    tie = tie_values(role, observed.around[i], stack.around[r, j], same)
+    weight = np.zeros(similarity.shape)
+    weight[r, i, j] = weights(similarity[r, i, j], tie)
     best = weight.max(axis=2)
     partner = np.where(best > 0, weight.argmax(axis=2), -1)
     unsure = (((weight == best[..., None]).sum(axis=2) > 1) & (best > 0)).any(axis=1)
     ordered = np.sort(partner, axis=1)
     unsure |= ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1)
-    for r in np.flatnonzero(unsure).tolist():
-        expected = stack.graphs[r]
-        rows, columns = assign(weight[r, :, : len(expected.names)], observed, expected)
-        partner[r] = -1
-        partner[r, rows] = np.where(weight[r, rows, columns] > 0, columns, -1)
+    for k in np.flatnonzero(unsure).tolist():
+        expected = stack.graphs[k]
+        rows, columns = assign(weight[k, :, : len(expected.names)], observed, expected)
+        partner[k] = -1
+        partner[k, rows] = np.where(weight[k, rows, columns] > 0, columns, -1)
     chosen = np.take_along_axis(similarity, np.maximum(partner, 0)[..., None], axis=2)[..., 0]
     return partner, np.where(partner >= 0, chosen, 0.0).sum(axis=1)
 

@@ -49,7 +49,7 @@ def mine(
 ) -> tuple[Precondition, ...]:
     """Literals that held in all references of a skill with the same kinds of arguments.
 
-    Where fewer than `minimum_support` references have the same kinds of arguments, all references
+    Where fewer than `minimum_support` demonstrations have the same kinds of arguments, all references
     of the skill are used, but only for literals that follow from the skill itself. Literals of the
     material (dirty, filled, cooked, sliced) are mined from the task at hand alone: that a bowl was
     clean before a salad says nothing about moving a bowl out of the way. So are literals about
@@ -64,7 +64,8 @@ def mine(
         task: name of the task at hand; that of the best reference by default.
 
     Returns:
-        Preconditions, the best supported first; `total` counts the references that were asked.
+        Preconditions, the best supported first; `support` and `total` count demonstrations, also
+        where several steps of one were retrieved.
     """
     config = config or MiningConfig()
     if not references:
@@ -74,7 +75,7 @@ def mine(
     skill = [r for r in references if _family(r.subtask) == _family(subtask)]
     kinds = _kinds(subtask, vocabulary)
     same = [r for r in skill if _kinds(r.subtask, vocabulary) == kinds]
-    alike = len(same) >= config.minimum_support
+    alike = len(_runs(same)) >= config.minimum_support
     group = same if alike else skill
     step = next((r.index for r in group if r.task == task), None)
     candidates: set[Literal] = set()
@@ -89,13 +90,11 @@ def mine(
         truths = [evaluate(literal, r.graph, r.subtask) for r in asked]
         if Truth.FALSE in truths:
             continue
-        counted = sum(
-            t is Truth.TRUE and (kind is not Kind.CONTEXT or r.index == step)
-            for t, r in zip(truths, asked, strict=True)
-        )
+        true = [r for t, r in zip(truths, asked, strict=True) if t is Truth.TRUE]
+        counted = [r for r in true if kind is not Kind.CONTEXT or r.index == step]
         needed = config.contextual_support if kind is Kind.CONTEXT else config.minimum_support
-        if counted >= needed:
-            support, total = truths.count(Truth.TRUE), len(truths)
+        if len(_runs(counted)) >= needed:
+            support, total = len(_runs(true)), len(_runs(asked))
             found.append(Precondition(subtask.skill, literal, support, total, support / total))
     return tuple(sorted(found, key=lambda p: (-p.weight, p.literal)))
 
@@ -121,6 +120,10 @@ def violations(
             key=lambda v: (v.truth is not Truth.FALSE, -v.precondition.weight, v.literal),
         )
     )
+
+
+def _runs(references: Sequence[Reference]) -> set[str]:
+    return {r.demonstration for r in references}
 
 
 def _family(subtask: Subtask) -> str:

@@ -227,14 +227,21 @@ def _bit(feature: str) -> int:
 
 
 def ties(observed: Prepared, expected: Prepared) -> Floats:
-    """(n_obs, n_exp) integers below 1024 that decide between equally similar nodes.
-
-    In this order: the same argument of the subtask, alike surroundings, the same id.
-    """
+    """(n_obs, n_exp) values that decide between equally similar nodes, see `tie_values`."""
     role = (observed.roles[:, None] == expected.roles) & (expected.roles > 0)
-    both = np.bitwise_count(observed.around[:, None] & expected.around).astype(np.int64)
-    any_ = np.bitwise_count(observed.around[:, None] | expected.around).astype(np.int64)
-    alike = (255 * (both + 1)) // (any_ + 1)
     same = observed.numbers[:, None] == expected.numbers
-    result: Floats = (512 * role + 2 * alike + same).astype(np.float64)
-    return result
+    return tie_values(role, observed.around[:, None], expected.around[None, :], same)
+
+
+def tie_values(
+    role: npt.NDArray[np.bool_],
+    ours: npt.NDArray[np.uint64],
+    theirs: npt.NDArray[np.uint64],
+    same: npt.NDArray[np.bool_],
+) -> Floats:
+    """Whole numbers below 1024: the same argument first, then alike surroundings, then the id."""
+    both = np.bitwise_count(ours & theirs).astype(np.int64)
+    either = np.bitwise_count(ours | theirs).astype(np.int64)
+    alike = (255 * (both + 1)) // (either + 1)
+    values: Floats = (512 * role + 2 * alike + same).astype(np.float64)
+    return values

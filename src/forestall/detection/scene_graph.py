@@ -15,6 +15,7 @@ from forestall.types.observation import Observation
 from forestall.types.verdict import Calibration, Decision, Reference, Verdict
 
 NO_REFERENCE = "no reference above the floor: nothing to compare with, so nothing was judged"
+NOT_COMPARABLE = "no reference had found {} at this point, so nothing was judged"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,9 @@ class SceneGraphDetector:
       look again, because what was not seen cannot be called wrong;
     - none otherwise: replan;
     - no reference at all: proceed with score None and a note; nothing was judged.
+
+    A reference that had not yet found an argument that is in sight here cannot say how it should
+    be, and is not compared with.
     """
 
     name = "scene-graph"
@@ -55,15 +59,18 @@ class SceneGraphDetector:
     ) -> Verdict:
         """Compare the scoped graph of a boundary with every reference."""
         config = self._config
-        best = self._scorer.best(observed, references)
+        able = [r for r in references if not unseen_by(r, observed)]
+        best = self._scorer.best(observed, able)
         if best is None or best.score is None:
+            unknown = sorted({name for r in references for name in unseen_by(r, observed)})
             return Verdict(
                 Decision.PROCEED,
                 self.name,
                 None,
                 config.threshold,
                 Calibration.UNCALIBRATED,
-                note=NO_REFERENCE,
+                references=len(references),
+                note=NOT_COMPARABLE.format(", ".join(unknown)) if references else NO_REFERENCE,
             )
         verdict = replace(
             best,
@@ -100,6 +107,18 @@ def unseen_arguments(
         if shown and sum(shown) >= share * len(shown):
             unseen.append(name)
     return tuple(unseen)
+
+
+def unseen_by(reference: Reference, observed: SceneGraph) -> tuple[str, ...]:
+    """Arguments that are in sight here and were not known in a reference of the same skill."""
+    subtask, other = observed.subtask, reference.subtask
+    if subtask is None or subtask.roles().keys() != other.roles().keys():
+        return ()
+    return tuple(
+        name
+        for role, name in subtask.roles().items()
+        if observed.matches(name) and not reference.graph.matches(other.roles()[role])
+    )
 
 
 def _located(node: ObjectNode | None) -> bool:

@@ -50,8 +50,8 @@ class HashedTextEncoder:
 
     A text is the sum of its words' vectors. A word's vector has a few signed slots for the word
     itself (so that two words seldom share them all) and, together as heavy as `ngram_weight`, one
-    for each character n-gram of 3 to 5 letters of "<word>", so that related spellings stay close. A text without any word gets a fixed unit
-    vector of its own.
+    for each character n-gram of 3 to 5 letters of "<word>", so that related spellings stay close.
+    A text without any word gets a fixed unit vector of its own.
 
     Args:
         dimensions: length of a row.

@@ -27,8 +27,11 @@ class RetrievalConfig:
 
     Args:
         k: how many references at most.
-        floor: smallest similarity of the subtask texts. With hashed words the same skill on
-            another object scores 0.55 to 0.75 and the same words 1.0.
+        floor: smallest similarity of the subtask texts. With hashed words the ten tasks' subtasks
+            score 1.0 for the same words, 0.87 at most for other things handled alike ("pick up
+            LettuceSliced" and "pick up Lettuce"), 0.55 to 0.75 for the same skill on another
+            object. A scene without the object at hand cannot come near the detector's threshold,
+            so such steps are no references by default.
         per_demonstration: how many steps of one demonstration at most. Two, so that a subtask that
             occurs twice in a task is not taken for its other occurrence without a contradiction.
         same_task_bonus: added to a similarity for ranking when the step is of the same task.
@@ -36,7 +39,7 @@ class RetrievalConfig:
     """
 
     k: int = 8
-    floor: float = 0.6
+    floor: float = 0.9
     per_demonstration: int = 2
     same_task_bonus: float = 0.05
     same_skill: bool = True
@@ -57,9 +60,10 @@ def subtask_words(subtask: Subtask) -> str:
     """The text that is compared: the subtask's words without instance numbers.
 
     All numbers are stripped: Mug-1 is a mug in every kitchen, and what was learnt in front of
-    StoveBurner-1 serves in front of StoveBurner-4.
+    StoveBurner-1 serves in front of StoveBurner-4. "Put in" and "put on" are both "put".
     """
-    return _NUMBER.sub("", subtask.words())
+    words = f"{_family(subtask).removesuffix('_obj').replace('_', ' ')} {' '.join(subtask.args)}"
+    return _NUMBER.sub("", words)
 
 
 class EmbeddingRetriever:

@@ -31,6 +31,7 @@ class SmallKitchen:
         *things: str,
         blocked: Mapping[str, str] | None = None,
         spots: Mapping[str, int] | None = None,
+        crowded: tuple[str, ...] = (),
         cool_down_s: float = 300.0,
     ) -> None:
         written = [self._parse(t) for t in things]
@@ -47,7 +48,9 @@ class SmallKitchen:
             for k in range(1, count + 1)
             if f"{c}-{k}" not in names
         ]
-        scene = FlatScene((*fixtures, *written, *prepared), blocked or {}, spots or {})
+        scene = FlatScene(
+            (*fixtures, *written, *prepared), blocked or {}, spots or {}, frozenset(crowded)
+        )
         self.world = FlatWorld(scene)
         self.env = KitchenEnvironment(
             SceneNeeds(),

@@ -62,3 +62,11 @@ def test_aliases_are_known_with_and_without_number():
     kitchen = SmallKitchen("Mug-1@CounterTop-1")
     kitchen.do("navigate_to_obj(SinkBasin-1)", "pick_up(Mug)", "put_in(Mug, SinkBasin)")
     assert kitchen.parent("Mug-1") == "Sink-1"
+
+
+def test_a_crowded_counter_in_reach_is_passed_over_for_a_clear_one():
+    kitchen = SmallKitchen("Mug-1@DiningTable-1", crowded=("CounterTop-1",))
+    kitchen.do("pick_up(Mug)", "navigate_to_obj(CounterTop-1)", "put_on(Mug, CounterTop)")
+    assert kitchen.parent("Mug-1") == "CounterTop-2"
+    kitchen.do("pick_up(Mug)", "put_on(Mug, CounterTop-1)")
+    assert kitchen.parent("Mug-1") == "CounterTop-1"

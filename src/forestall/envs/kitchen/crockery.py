@@ -18,6 +18,7 @@ LIQUIDS: dict[str, Rgba] = {
     "wine": (0.42, 0.02, 0.09, 1),
 }
 STAIN: Rgba = (0.27, 0.155, 0.05, 1)
+_STAIN_ON_DARK: Rgba = (0.56, 0.38, 0.17, 1)
 WHOLE: When = {"broken": ("intact",)}
 
 _CHINA: tuple[Rgba, ...] = (
@@ -53,6 +54,11 @@ def chosen(category: str, rng: np.random.Generator, otherwise: Sequence[Rgba] = 
     r, g, b, a = options[int(rng.integers(len(options)))]
     shade = float(rng.uniform(0.95, 1.05))
     return (min(r * shade, 1), min(g * shade, 1), min(b * shade, 1), a)
+
+
+def stain_on(rgba: Rgba) -> Rgba:
+    """A brown that stands out on a colour."""
+    return STAIN if sum(rgba[:3]) > 0.9 else _STAIN_ON_DARK
 
 
 def darker(rgba: Rgba, factor: float) -> Rgba:
@@ -141,7 +147,7 @@ def vessel(part: Assembly, category: str, shape: Mapping[str, Any], states: froz
             solid=False,
         )
     if "dirty" in states:
-        _stain_walls(part, walls, whole)
+        _stain_walls(part, walls, whole, stain_on(rgba))
     if "broken" in states:
         _shards(part, radius, rgba)
     profile = tuple((z - walls.floor_m, r) for r, z in walls.inner)
@@ -214,21 +220,21 @@ def _ring_handle(
     return Rect(footprint.x0, footprint.y0, out + 0.006, footprint.y1)
 
 
-def _stain_walls(part: Assembly, walls: _Walls, whole: When) -> None:
+def _stain_walls(part: Assembly, walls: _Walls, whole: When, brown: Rgba) -> None:
     """Irregular brown patches on the floor, the inner wall up to the rim, and the outer wall."""
     rng = part.kit.rng
     radius, height = walls.outer[-1]
     inside = [(0.001, walls.floor_m), *walls.inner]
-    scale = float(np.clip(radius * 0.36, 0.016, 0.034))
-    turns = rng.uniform(0, 2 * np.pi) + np.arange(6) * 2 * np.pi / 6
+    scale = float(np.clip(radius * 0.42, 0.019, 0.040))
+    turns = rng.uniform(0, 2 * np.pi) + np.arange(7) * 2 * np.pi / 7
     patches = []
     for k, angle in enumerate(turns):
         size = scale * float(rng.uniform(0.75, 1.15))
         size_in = min(size, height * 0.8)
         at_in = float(rng.uniform(0.72, 0.88) if k % 2 else rng.uniform(0.25, 0.5))
         patches.append(meshes.patch_on_lathe(inside, angle, at_in, size_in, -0.0012, rng))
-        if k % 2 == 0:
-            size_out = min(size, height * 0.42)
+        if k % 3 != 2:
+            size_out = min(size, height * 0.44)
             at = float(rng.uniform(0.45, 0.7))
             patches.append(
                 meshes.patch_on_lathe(walls.outer, angle + 0.5, at, size_out, 0.0012, rng)
@@ -239,7 +245,7 @@ def _stain_walls(part: Assembly, walls: _Walls, whole: When) -> None:
         spot = meshes.extrude(meshes.blob(size, rng), 0, 0.0012)
         x, y = float(r * np.cos(a)), float(r * np.sin(a))
         patches.append(meshes.moved(spot, x, y, walls.floor_m))
-    part.mesh(meshes.merged(patches), STAIN, texture="food", when={"dirty": ("dirty",), **whole})
+    part.mesh(meshes.merged(patches), brown, texture="food", when={"dirty": ("dirty",), **whole})
 
 
 def _shards(part: Assembly, radius: float, rgba: Rgba) -> None:
@@ -278,7 +284,7 @@ def dish(part: Assembly, category: str, shape: Mapping[str, Any], states: frozen
         spots = []
         for k in range(6):
             angle = 2 * np.pi * k / 6 + float(rng.uniform(-0.4, 0.4))
-            size = radius * float(rng.uniform(0.16, 0.28))
+            size = radius * float(rng.uniform(0.20, 0.32))
             if k % 2:
                 spots.append(meshes.patch_on_lathe(inner, angle, 0.5, size * 0.7, -0.0015, rng))
             reach = radius * float(rng.uniform(0.12, 0.42))

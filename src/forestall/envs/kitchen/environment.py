@@ -49,8 +49,15 @@ class Stage(World, Protocol):
         """Where the robot stands."""
 
     @property
+    def robot_yaw_rad(self) -> float:
+        """Its heading, counter-clockwise from +x."""
+
+    @property
     def gripper_position_world_m(self) -> Vec3:
         """Where its hand is."""
+
+    def turn_to(self, yaw_rad: float) -> float:
+        """Turn on the spot to a heading; returns the simulated seconds."""
 
     def look_at(self, point_world_m: Vec3) -> npt.NDArray[np.float64]:
         """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
@@ -147,18 +154,23 @@ class KitchenEnvironment:
         effects.settle(household, self._effect_config)
 
     def scan(self) -> Observation:
-        """A full turn on the spot, with the time that turning takes."""
-        world = self._stage
-        step = 2 * math.pi / SCAN_FRAMES
-        poses = [world.camera_to_world(k * step, SCAN_TILT_RAD) for k in range(SCAN_FRAMES)]
-        self._acting.household.time_s += 4 * self._times.turn_s_per_90deg
-        return self._observation(poses)
+        """Views all around: the base turns once on the spot, which takes its time."""
+        world, household = self._stage, self._acting.household
+        start_rad = world.robot_yaw_rad
+        frames = []
+        for k in range(SCAN_FRAMES):
+            world.turn_to(start_rad + 2 * math.pi * k / SCAN_FRAMES)
+            frames.append(self._frame(world.camera_to_world(0.0, SCAN_TILT_RAD)))
+        world.turn_to(start_rad)
+        household.time_s += 4 * self._times.turn_s_per_90deg
+        return self._observation(frames)
 
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
         """One frame towards each world point, straight ahead and slightly down without any."""
         world = self._stage
         poses = [world.look_at(point) for point in focus]
-        return self._observation(poses or [world.camera_to_world(0.0, AHEAD_TILT_RAD)])
+        poses = poses or [world.camera_to_world(0.0, AHEAD_TILT_RAD)]
+        return self._observation([self._frame(pose) for pose in poses])
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""
@@ -202,11 +214,13 @@ class KitchenEnvironment:
             raise ForestallError("the kitchen has no scene yet: call reset(seed) first")
         return self._world
 
-    def _observation(self, poses: Sequence[npt.NDArray[np.float64]]) -> Observation:
-        world, household = self._stage, self._acting.household
+    def _frame(self, camera_to_world: npt.NDArray[np.float64]) -> Frame:
         if self._renderer is None:
-            self._renderer = self._make(world, self._intrinsics)
-        frames: list[Frame] = [self._renderer.render(world.data, pose) for pose in poses]
+            self._renderer = self._make(self._stage, self._intrinsics)
+        return self._renderer.render(self._stage.data, camera_to_world)
+
+    def _observation(self, frames: Sequence[Frame]) -> Observation:
+        world, household = self._stage, self._acting.household
         return Observation(
             frames=tuple(frames),
             gripper=GripperState(household.held, world.gripper_position_world_m),
@@ -216,7 +230,7 @@ class KitchenEnvironment:
 
 
 def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stage:
-    from forestall.envs.kitchen.world import build_scene
+    from forestall.envs.kitchen.model import build_scene
 
     return build_scene(needs, seed, vocabulary)
 

@@ -7,6 +7,7 @@ where there is no room, or moving what is not there, is an error and not a shrug
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -72,11 +73,13 @@ class FlatScene:
         instances: all things, prepared ones included.
         blocked: thing → what stands in front of it, while both are on the same support.
         spots: receptacle → how many things have room (8 where nothing is said).
+        crowded: receptacles where everything new stands in something's way.
     """
 
     instances: tuple[FlatInstance, ...]
     blocked: Mapping[str, str] = field(default_factory=dict)
     spots: Mapping[str, int] = field(default_factory=dict)
+    crowded: frozenset[str] = frozenset()
 
 
 class FlatWorld:
@@ -91,7 +94,7 @@ class FlatWorld:
         fixtures = [i.name for i in scene.instances if i.parent is None and not i.prepared]
         self._stations = {name: float(k) for k, name in enumerate(fixtures)}
         self._robot_x_m = -1.0
-        self._heading_rad = 0.0
+        self._yaw_rad = math.pi / 2
         self.shown: list[tuple[str, str, str]] = []
         self._parents: dict[str, str | None] = {}
         self._lying_x_m: dict[str, float] = {}
@@ -108,7 +111,7 @@ class FlatWorld:
         self._parents = {i.name: i.parent for i in self.instances if not i.prepared}
         self._lying_x_m = {}
         self._held = None
-        self._robot_x_m, self._heading_rad = -1.0, 0.0
+        self._robot_x_m, self._yaw_rad = -1.0, math.pi / 2
         self.shown = []
 
     def x_m(self, name: str) -> float:
@@ -151,6 +154,10 @@ class FlatWorld:
         """Whether a spot of the receptacle is free."""
         on_it = [n for n, p in self._parents.items() if p == receptacle and n != thing]
         return len(on_it) < self.scene.spots.get(receptacle, 8)
+
+    def has_clear_room(self, thing: str, receptacle: str) -> bool:
+        """Whether a spot is free on a receptacle that is not crowded."""
+        return receptacle not in self.scene.crowded and self.has_room(thing, receptacle)
 
     def place(self, thing: str, receptacle: str) -> None:
         """Attach a thing to a receptacle."""
@@ -207,13 +214,24 @@ class FlatWorld:
         return (self._robot_x_m, -0.5, 0.0)
 
     @property
+    def robot_yaw_rad(self) -> float:
+        """The robot faces the row until it is turned."""
+        return self._yaw_rad
+
+    def turn_to(self, yaw_rad: float) -> float:
+        """Turn on the spot; one second for every quarter."""
+        turned = abs(yaw_rad - self._yaw_rad)
+        self._yaw_rad = yaw_rad
+        return turned / (math.pi / 2)
+
+    @property
     def gripper_position_world_m(self) -> Vec3:
         """The hand is in front of the robot."""
         return (self._robot_x_m, -0.2, 1.0)
 
     def camera_to_world(self, pan_rad: float, tilt_rad: float) -> npt.NDArray[np.float64]:
         """A camera 1.5 m high, turned by pan (left positive) and tilt (down positive)."""
-        yaw = np.pi / 2 + pan_rad
+        yaw = self._yaw_rad + pan_rad
         forward = np.array(
             [np.cos(yaw) * np.cos(tilt_rad), np.sin(yaw) * np.cos(tilt_rad), -np.sin(tilt_rad)]
         )
@@ -227,7 +245,7 @@ class FlatWorld:
         """The camera turned towards a point."""
         x, y, z = (p - q for p, q in zip(point_world_m, (self._robot_x_m, -0.5, 1.5), strict=True))
         return self.camera_to_world(
-            float(np.arctan2(y, x)) - np.pi / 2, -float(np.arctan2(z, np.hypot(x, y)))
+            float(np.arctan2(y, x)) - self._yaw_rad, -float(np.arctan2(z, np.hypot(x, y)))
         )
 
 

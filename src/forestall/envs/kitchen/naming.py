@@ -3,8 +3,8 @@
 Skills call this first. An instance name means itself. A category name means, in this order:
 
 - for what is placed, poured or cracked: the held thing, if it is of the category;
-- for a receptacle: one that is accessible and has room for the held thing, in reach before out of
-  reach, lowest number first;
+- for a receptacle: one that is accessible and has room for the held thing, where it stands in
+  nobody's way before where it does, in reach before out of reach, lowest number first;
 - for everything else: accessible before enclosed, unblocked before blocked, in reach before out of
   reach, lowest number first.
 """
@@ -12,9 +12,18 @@ Skills call this first. An instance name means itself. A category name means, in
 from __future__ import annotations
 
 import difflib
+from typing import Protocol, runtime_checkable
 
 from forestall.envs.kitchen.household import Household, natural_key
 from forestall.types.facts import category_of, is_instance
+
+
+@runtime_checkable
+class Tidy(Protocol):
+    """A world that can tell a good spot from one that is merely free."""
+
+    def has_clear_room(self, thing: str, receptacle: str) -> bool:
+        """Whether `thing` finds a spot where it blocks nothing and nothing blocks it."""
 
 
 class RefusalError(Exception):
@@ -52,11 +61,16 @@ def resolve_receptacle(household: Household, name: str, thing: str) -> str:
     if not candidates:
         raise RefusalError(f"{thing} cannot go into itself")
 
-    def key(candidate: str) -> tuple[bool, bool, bool, tuple[str, int, str]]:
+    world = household.world
+
+    def key(candidate: str) -> tuple[bool, bool, bool, bool, tuple[str, int, str]]:
+        full = why_no_room(household, thing, candidate) is not None
+        tidy = full or not isinstance(world, Tidy) or world.has_clear_room(thing, candidate)
         return (
             household.closed_around(candidate) is not None,
-            why_no_room(household, thing, candidate) is not None,
-            not household.world.within_reach(candidate),
+            full,
+            not tidy,
+            not world.within_reach(candidate),
             natural_key(candidate),
         )
 

@@ -42,8 +42,8 @@ from forestall.types.observation import Vec3
 
 REACH_M = 1.45
 REACH_ANGLE_RAD = float(np.deg2rad(75))
-HAND_M = (0.45, -0.17, EYE_HEIGHT_M - 0.36)
-"""Where the hand is: forward and left of the robot's axis, and above the floor."""
+HAND_M = (0.45, -0.21, EYE_HEIGHT_M - 0.45)
+"""Where the hand is: forward and left (here: right) of the robot's axis, and above the floor."""
 
 BLOCKING_WAY_M = 0.25
 _YAWS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
@@ -159,6 +159,13 @@ class KitchenWorld:
         self._stand(goal)
         return seconds
 
+    def turn_to(self, yaw_rad: float) -> float:
+        """Turn on the spot to a heading; returns the simulated seconds."""
+        goal = Standing(self._robot.x, self._robot.y, yaw_rad)
+        seconds = self._robot.seconds_to(goal)
+        self._stand(goal)
+        return seconds
+
     def standing_for(self, name: str) -> Standing | None:
         """Where the robot stands to work at something; None when there is no place."""
         target, places = self._approach(name)
@@ -185,6 +192,15 @@ class KitchenWorld:
             if tried > 60:
                 break
         return best[1] if best else None
+
+    @property
+    def standing(self) -> Standing:
+        """Where the robot stands."""
+        return self._robot
+
+    def connected(self, a: Standing, b: Standing) -> bool:
+        """Whether the robot can drive from one place to another."""
+        return self._free_floor().connected((a.x, a.y), (b.x, b.y))
 
     def _seen_as(self, name: str) -> str:
         """The outermost closed thing around `name`, else `name`."""
@@ -248,8 +264,12 @@ class KitchenWorld:
         """Whether `name` can be reached from where the robot stands."""
         if name == self.held_name or self.bodies.root(name) == self.held_name:
             return True
+        return self.reachable_from(self._robot, name)
+
+    def reachable_from(self, standing: Standing, name: str) -> bool:
+        """Whether `name` could be reached from a standing place."""
         low, high = self.bodies.box(name)
-        here = np.array([self._robot.x, self._robot.y])
+        here = np.array([standing.x, standing.y])
         nearest = np.clip(here, low[:2], high[:2])
         way = nearest - here
         distance = float(np.hypot(*way))
@@ -257,7 +277,7 @@ class KitchenWorld:
             return False
         if distance < 0.3:
             return True
-        off = navigation.wrapped(float(np.arctan2(way[1], way[0])) - self._robot.yaw_rad)
+        off = navigation.wrapped(float(np.arctan2(way[1], way[0])) - standing.yaw_rad)
         return abs(off) <= REACH_ANGLE_RAD
 
     # what stands in the way
@@ -289,6 +309,10 @@ class KitchenWorld:
     def has_room(self, thing: str, receptacle: str) -> bool:
         """Whether there is a free spot for `thing` on or in `receptacle`."""
         return self.find_spot(thing, receptacle) is not None
+
+    def has_clear_room(self, thing: str, receptacle: str) -> bool:
+        """Whether `thing` finds a spot where it blocks nothing and nothing blocks it."""
+        return self.find_spot(thing, receptacle, levels=LEVELS[:1]) is not None
 
     def find_spot(
         self,
