@@ -54,6 +54,11 @@ def test_labels_are_unique_and_name_their_subtask() -> None:
     assert text.read_plan(["pick_up_knife-1", "reach-goal-1"])[0].subtask.skill == "pick_up"
 
 
+FF_ONLY = "lazy_greedy([ff()],preferred=[ff()])"
+"""Not the engine's default: with reasonable orders its landmark heuristic calls the large problem a
+dead end, although both this configuration and plain landmarks solve it and the plan checks out."""
+
+
 def fast_downward(text: Pddl, folder: Path) -> list[str] | None:
     """Action names of Fast Downward's plan, None where it proves that there is none."""
     from unified_planning.engines import PlanGenerationResultStatus as Status
@@ -65,7 +70,9 @@ def fast_downward(text: Pddl, folder: Path) -> list[str] | None:
     domain.write_text(text.domain)
     problem.write_text(text.problem)
     read = PDDLReader().parse_problem(str(domain), str(problem))
-    with OneshotPlanner(name="fast-downward") as planner:
+    with OneshotPlanner(
+        name="fast-downward", params={"fast_downward_search_config": FF_ONLY}
+    ) as planner:
         result = planner.solve(read, timeout=60)
     if result.plan is None:
         assert result.status in (

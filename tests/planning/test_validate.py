@@ -7,7 +7,8 @@ from forestall.planning.validate import GraphValidator, observed, run
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
-from planning.corpus import GOALS, PLANS, VOCABULARY, WRONG, Wrong, goal, home_of, plan, scene
+from planning.corpus import GOALS, PLANS, VOCABULARY, goal, home_of, plan, scene
+from planning.wrong_plans import WRONG, Wrong
 
 CHECK = GraphValidator(VOCABULARY).check
 

@@ -49,11 +49,11 @@ def mine(
 ) -> tuple[Precondition, ...]:
     """Literals that held in all references of a skill with the same kinds of arguments.
 
-    Where fewer than `minimum_support` demonstrations have the same kinds of arguments, all references
-    of the skill are used, but only for literals that follow from the skill itself. Literals of the
-    material (dirty, filled, cooked, sliced) are mined from the task at hand alone: that a bowl was
-    clean before a salad says nothing about moving a bowl out of the way. So are literals about
-    what is no argument of the subtask, and their support must come from one step of that task.
+    Where fewer than `minimum_support` demonstrations have the same kinds of arguments, all
+    references of the skill are used, but only for literals that follow from the skill itself.
+    Literals of the material (dirty, filled, cooked, sliced) are mined from the task at hand alone:
+    that a bowl was clean before a salad says nothing about moving a bowl out of the way. So are
+    literals about what is no argument of the subtask; their support must come from one step.
     What was not observed in a demonstration counts neither for nor against a literal.
 
     Args:

@@ -7,7 +7,7 @@ outline with a step in depth. Called by `fuse.py`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack
 from forestall.perception.support import Parent
-from forestall.perception.unproject import Labels
+from forestall.perception.unproject import Labels, Points
 from forestall.types.graph import Relation
 from forestall.types.observation import Depth, Vec3
 
@@ -49,7 +49,7 @@ def cuts(
 def blocking(
     stack: Stack,
     parents: Mapping[str, Parent],
-    robot_position_world_m: Vec3,
+    eye_world_m: Vec3,
     cut_share: Mapping[tuple[str, str], float],
     config: PerceptionConfig,
 ) -> list[Relation]:
@@ -58,74 +58,115 @@ def blocking(
     Args:
         stack: located things.
         parents: what each thing rests in or on.
-        robot_position_world_m: where the robot stands.
+        eye_world_m: where the robot looks from.
         cut_share: (nearer, farther) → share of the farther one's outline that is cut off.
         config: thresholds.
     """
-    found = []
-    robot = np.asarray(robot_position_world_m[:2])
-    gap = stack.gaps_m()
     index = {t.id: i for i, t in enumerate(stack.things)}
-    members = [i for i in sorted(parents) if i in index]
-    for target in members:
-        for other in members:
-            a, b = index[target], index[other]
-            if other == target or parents[other] != parents[target]:
+    beside: dict[Parent, list[str]] = {}
+    for name in sorted(parents):
+        if name in index and parents[name][1] in index:
+            beside.setdefault(parents[name], []).append(name)
+    found = []
+    eye = np.asarray(eye_world_m)
+    for (predicate, support), names in beside.items():
+        if len(names) < 2:
+            continue
+        if predicate == "inside":
+            axes = _opening(stack, index[support], [index[n] for n in names], eye, config)
+        else:
+            axes = _open_edge(stack, index[support], eye, config)
+        extents = {n: _extent(stack, index[n], axes) for n in names}
+        for target in names:
+            if _from_above(stack, index[support], index[target], config):
                 continue
-            if gap[a, b] > config.corridor_m:
-                continue
-            if _between(stack, a, b, robot, config) or (
-                cut_share.get((other, target), 0.0) >= config.occlusion_share
-                and _in_front(stack, a, b, robot, config)
-            ):
-                found.append(Relation(other, "blocking", target))
+            for other in names:
+                cut = cut_share.get((other, target), 0.0) >= config.occlusion_share
+                if other != target and _in_the_way(extents[target], extents[other], cut, config):
+                    found.append(Relation(other, "blocking", target))
     return found
 
 
-def _approach(
-    stack: Stack, a: int, robot: npt.NDArray[np.float64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Middle of a thing and the (2, 2) rows: direction to the robot, and across it."""
-    centre = (stack.low_m[a, :2] + stack.high_m[a, :2]) / 2
-    towards = robot - centre
-    length = float(np.linalg.norm(towards))
-    x, y = towards / length if length > 1e-9 else np.array([1.0, 0.0])
-    return centre, np.array([[x, y], [-y, x]])
+Axes = npt.NDArray[np.float64]
+"""(2, 2) rows: the horizontal direction from a thing to the hand that comes for it, and across."""
 
 
-def _extent(
-    stack: Stack, i: int, centre: npt.NDArray[np.float64], axes: npt.NDArray[np.float64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    local = (stack.samples[i][:, :2] - centre) @ axes.T
-    return local.min(axis=0), local.max(axis=0)
+def _axes(direction: npt.NDArray[np.float64]) -> Axes:
+    return np.array([direction, [-direction[1], direction[0]]])
 
 
-def _between(
-    stack: Stack, a: int, b: int, robot: npt.NDArray[np.float64], config: PerceptionConfig
+def _open_edge(stack: Stack, support: int, eye_world_m: Points, config: PerceptionConfig) -> Axes:
+    """Over which edge of a support a hand comes.
+
+    Over a longer side, the one towards the robot; over the side that faces the robot most where
+    the sides are alike.
+    """
+    size = stack.high_m[support, :2] - stack.low_m[support, :2]
+    towards = eye_world_m[:2] - (stack.high_m[support, :2] + stack.low_m[support, :2]) / 2
+    along = int(np.argmin(size))
+    if size.max() < config.oblong * size.min():
+        along = int(np.argmax(np.abs(towards)))
+    direction = np.zeros(2)
+    direction[along] = 1.0 if towards[along] >= 0 else -1.0
+    return _axes(direction)
+
+
+def _opening(
+    stack: Stack,
+    container: int,
+    contents: Sequence[int],
+    eye_world_m: Points,
+    config: PerceptionConfig,
+) -> Axes:
+    """Through which side of a container a hand comes: the one with the least wall in the way."""
+    low = stack.low_m[list(contents)].min(axis=0)
+    high = stack.high_m[list(contents)].max(axis=0)
+    centre = (low + high)[:2] / 2
+    p = stack.things[container].points_world_m
+    level = p[(p[:, 2] > low[2] + config.rim_slack_m) & (p[:, 2] < high[2])][:, :2] - centre
+    options = []
+    for direction in (
+        np.array([1.0, 0]),
+        np.array([-1.0, 0]),
+        np.array([0, 1.0]),
+        np.array([0, -1.0]),
+    ):
+        along, across = _axes(direction) @ level.T
+        wall = int(np.count_nonzero((along > config.ring_m) & (np.abs(across) < config.near_m)))
+        options.append((wall, -float(direction @ (eye_world_m[:2] - centre)), tuple(direction)))
+    return _axes(np.array(min(options)[2]))
+
+
+def _extent(stack: Stack, i: int, axes: Axes) -> tuple[float, float, float, float, float, float]:
+    """Extent of a thing towards the hand, across, and upwards."""
+    local = stack.samples[i][:, :2] @ axes.T
+    low, high = local.min(axis=0), local.max(axis=0)
+    return (
+        float(low[0]), float(high[0]), float(low[1]), float(high[1]),
+        float(stack.low_m[i, 2]), float(stack.high_m[i, 2]),
+    )  # fmt: skip
+
+
+def _from_above(stack: Stack, support: int, target: int, config: PerceptionConfig) -> bool:
+    """Whether the target is reached from above: on the floor, or in something open on top."""
+    foot, top = stack.low_m[target, 2], stack.high_m[target, 2]
+    if foot < config.floor_m:
+        return True
+    low, high = stack.low_m[support, 2], stack.high_m[support, 2]
+    return bool(low + config.rim_slack_m < foot < high - config.rim_slack_m) and bool(
+        high < top + config.headroom_m
+    )
+
+
+def _in_the_way(
+    target: tuple[float, ...], other: tuple[float, ...], cut: bool, config: PerceptionConfig
 ) -> bool:
-    """Whether `b` cuts the corridor through which the robot's hand comes to `a`."""
-    if stack.high_m[b, 2] < stack.low_m[a, 2] + config.min_obstacle_m:
+    """Whether `other` stands in the target's corridor towards the hand."""
+    _, front, left, right, foot, top = target
+    back_b, front_b, left_b, right_b, foot_b, top_b = other
+    if top_b < foot + config.min_obstacle_m or foot_b >= top:
         return False
-    centre, axes = _approach(stack, a, robot)
-    low_a, high_a = _extent(stack, a, centre, axes)
-    low_b, high_b = _extent(stack, b, centre, axes)
-    if not high_a[0] - config.ring_m <= (low_b[0] + high_b[0]) / 2:
+    if front_b <= front or back_b >= front + config.corridor_m:
         return False
-    if low_b[0] > high_a[0] + config.corridor_m:
-        return False
-    half = max(config.corridor_half_width_m, min(-low_a[1], high_a[1]))
-    across = min(high_b[1], half) - max(low_b[1], -half)
-    return bool(across >= config.corridor_share * 2 * half)
-
-
-def _in_front(
-    stack: Stack, a: int, b: int, robot: npt.NDArray[np.float64], config: PerceptionConfig
-) -> bool:
-    """Whether `b` is nearer to the robot than `a` and within the corridor's depth."""
-    if stack.high_m[b, 2] < stack.low_m[a, 2] + config.min_obstacle_m:
-        return False
-    centre, axes = _approach(stack, a, robot)
-    _, high_a = _extent(stack, a, centre, axes)
-    low_b, high_b = _extent(stack, b, centre, axes)
-    middle = (low_b[0] + high_b[0]) / 2
-    return bool(middle > 0 and low_b[0] <= high_a[0] + config.corridor_m)
+    margin = 0.0 if cut else config.corridor_margin * (right - left)
+    return right_b > left + margin and left_b < right - margin

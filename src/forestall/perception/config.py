@@ -46,8 +46,11 @@ class PerceptionConfig:
         lateral_cosine: for left and right (REFLECT: 0.8).
         frontal_cosine: for in front of and behind (REFLECT: 0.9).
         corridor_m: how far in front of a thing another one stands in the way.
-        corridor_half_width_m: least half width of the approach corridor (a hand's).
-        corridor_share: share of the corridor's width that must be cut.
+        corridor_margin: share of a thing's width at each side that may be covered: a hand grasps
+            its middle.
+        oblong: how much longer the long side of a support must be to tell its front.
+        floor_m: things whose foot is lower are reached from above.
+        headroom_m: things in containers that do not rise higher above them likewise.
         min_obstacle_m: how far an obstacle must rise above the target's foot.
         occlusion_share: share of a mask's outline that the nearer mask cuts off (REFLECT asks for
             an image overlap of 0.5 of whole boxes; an outline is evidence of real occlusion).
@@ -57,6 +60,8 @@ class PerceptionConfig:
         free_margin_share: the same as a share of the distance (depth noise grows with it).
         gone_share: share of remembered points seen to be free or something else's, above which
             the object has gone.
+        unmoved_share: share of remembered points that a new view must confirm, of those that it
+            confirms or refutes, for a thing to be where it was.
         expected_pixels: expected size in the image, as a multiple of `min_pixels`, above which a
             missing detection means something.
         interior_share: share of a container's depth samples that must be seen for its inside to
@@ -89,14 +94,17 @@ class PerceptionConfig:
     lateral_cosine: float = 0.8
     frontal_cosine: float = 0.9
     corridor_m: float = 0.25
-    corridor_half_width_m: float = 0.05
-    corridor_share: float = 0.35
+    corridor_margin: float = 0.2
+    oblong: float = 1.15
+    floor_m: float = 0.3
+    headroom_m: float = 0.1
     min_obstacle_m: float = 0.04
     occlusion_share: float = 0.12
     depth_edge_m: float = 0.03
     free_margin_m: float = 0.02
     free_margin_share: float = 0.01
     gone_share: float = 0.5
+    unmoved_share: float = 0.8
     expected_pixels: float = 4.0
     interior_share: float = 0.2
     same_place_m: float = 0.3

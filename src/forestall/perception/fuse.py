@@ -97,23 +97,24 @@ class SceneMemory:
     def _place(self, track: Track, fresh: Points, fate: Fates | None) -> None:
         """Set a track's cloud from the newest views and what they leave standing of the old."""
         old = track.points_world_m
+        track.unmoved = False
         fixture = self._is_fixture(track.category)
         voxel = self._config.fixture_voxel_m if fixture else self._config.voxel_m
         if old is not None and fate is not None:
             kept = old[fate != Fate.GONE]
-            if fixture or self._unmoved(track, fresh, fate):
+            track.unmoved = fixture or self._unmoved(track, fate)
+            if track.unmoved:
                 fresh = np.concatenate([fresh, kept])
         track.points_world_m = _thinned(fresh, voxel)
         track.low_m, track.high_m = robust_box(track.points_world_m, self._config.box_percentile)
         track.centroid_m = track.points_world_m.mean(axis=0)
 
-    def _unmoved(self, track: Track, fresh: Points, fate: Fates) -> bool:
-        """Whether a new view of a movable thing only shows a part of what was there before."""
-        if track.id == self._held or float((fate == Fate.GONE).mean()) > 0.2:
-            return False
-        low, high = robust_box(fresh, self._config.box_percentile)
-        slack = 2 * self._config.voxel_m
-        return bool(np.all(low >= track.low_m - slack) and np.all(high <= track.high_m + slack))
+    def _unmoved(self, track: Track, fate: Fates) -> bool:
+        """Whether a movable thing is where it was: what can be seen of the old place agrees."""
+        agree = int(np.count_nonzero(fate == Fate.CONFIRMED))
+        differ = int(np.count_nonzero(fate == Fate.GONE))
+        still = agree >= self._config.unmoved_share * (agree + differ)
+        return agree > 0 and still and track.id != self._held
 
     def _hold(self, held: str, seen: set[str]) -> None:
         track = self.tracks.get(held)
@@ -237,13 +238,18 @@ class SceneMemory:
         self._relations = relations
 
     def _former_parent(self, track: Track) -> Parent | None:
-        """Keep a relation that the newest view cannot show again: what is on the held thing."""
+        """Keep a relation that the newest view cannot show again.
+
+        That is so for what did not move (its foot may be out of the picture) and for what is still
+        at its parent (on a held plate).
+        """
         if track.parent is None or track.parent[1] not in self.tracks:
             return None
         parent = self.tracks[track.parent[1]]
         if parent.points_world_m is None:
             return None
-        return track.parent if _gap_m(track, parent) <= self._config.ring_m else None
+        close = track.unmoved or _gap_m(track, parent) <= self._config.ring_m
+        return track.parent if close else None
 
     def _cut_shares(self, views: Sequence[View]) -> dict[tuple[str, str], float]:
         shares: dict[tuple[str, str], float] = {}

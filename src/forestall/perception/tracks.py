@@ -21,7 +21,11 @@ from forestall.types.observation import Frame
 
 @dataclass(slots=True)
 class Track:
-    """One object as believed now; `points_world_m` is None when its place is not known."""
+    """One object as believed now; `points_world_m` is None when its place is not known.
+
+    `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
+    view that showed it showed it where it was before.
+    """
 
     id: str
     category: str
@@ -36,6 +40,7 @@ class Track:
     states: dict[str, str | None] = field(default_factory=dict)
     parent: Parent | None = None
     interior_seen: bool = False
+    unmoved: bool = False
 
     def move(self, offset_m: Points) -> None:
         """Shift everything that is remembered of its place."""

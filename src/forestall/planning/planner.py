@@ -61,7 +61,7 @@ def plan_to(
     if outcome is ReplanOutcome.SOLVED:
         named = {a for goal in goals for x in goal for a in x.args}
         loose = frozenset(x for x in kept.supports if x not in named)
-        steps = [problem.operators[i] for i in found.steps]
+        steps = _gathered(problem, state, [problem.operators[i] for i in found.steps])
         subtasks, final, note = with_driving(state, steps, loose)
         if final is None:
             outcome = ReplanOutcome.REJECTED
@@ -92,6 +92,43 @@ def pose(state: State, goals: Sequence[Conjunction], also: Iterable[str] = ()) -
     return translate(state, goals, universe(state, goals, also))
 
 
+def _gathered(problem: Problem, state: State, steps: list[Operator]) -> list[Operator]:
+    """Turn things on and off where the robot is anyway, if that saves driving.
+
+    A step at a switch moves up behind the last step at its place, where the plan still works.
+    """
+    for i, step in enumerate(steps):
+        if not step.subtask.skill.startswith("toggle"):
+            continue
+        place = _place(state, step.subtask.args[0])
+        near = [j for j in range(i - 1) if _place(state, steps[j].subtask.args[-1]) == place]
+        if not near or _place(state, steps[i - 1].subtask.args[-1]) == place:
+            continue
+        moved = [*steps[: near[-1] + 1], step, *steps[near[-1] + 1 : i], *steps[i + 1 :]]
+        if _works(problem, moved):
+            steps = moved
+    return steps
+
+
+def _works(problem: Problem, steps: Sequence[Operator]) -> bool:
+    bits = problem.initial
+    for operator in steps:
+        if operator.condition & bits != operator.condition:
+            return False
+        bits = operator.apply(bits)
+    return problem.reached(bits)
+
+
+def _place(state: State, name: str) -> str | None:
+    """Where the robot stands to handle a thing; None for what does not exist yet."""
+    if name not in state.kinds:
+        return None
+    device = state.category(name).device
+    if device is not None and device.acts_on is not None and state.targets(name):
+        return state.targets(name)[0]
+    return state.root(name)
+
+
 def with_driving(
     state: State, operators: Sequence[Operator], loose: frozenset[str] = frozenset()
 ) -> tuple[tuple[Subtask, ...], State | None, str]:
@@ -104,15 +141,12 @@ def with_driving(
     for operator in operators:
         subtask, over = operator.subtask, operator.over
         subject = over or subtask.args[-1]
-        place = state.root(subject)
-        device = state.category(subject).device
-        if device is not None and device.acts_on is not None and state.targets(subject):
-            place = state.targets(subject)[0]
+        place = _place(state, subject)
         steps_here = [subtask]
         if (place != where or over) and subject != state.held:
             steps_here.insert(0, Subtask("navigate_to_obj", (_landmark(state, subject),)))
         where = place
-        if place in loose and place == subject and state.instances(state.kinds[place])[0] == place:
+        if place == subject and place in loose and state.instances(state.kinds[place])[0] == place:
             steps_here = [_renamed(s, place, state.kinds[place]) for s in steps_here]
         for step in steps_here:
             after = apply(state, step)

@@ -3,6 +3,8 @@
 import pytest
 from small_kitchen import SmallKitchen
 
+from forestall.errors import SceneError
+
 # what devices do
 
 
@@ -302,3 +304,15 @@ def test_a_dropped_vessel_spills_its_liquid_and_keeps_its_contents():
 
 def test_an_empty_hand_drops_nothing():
     assert SmallKitchen().env.drop_held() is None
+
+
+def test_nothing_falls_where_there_is_no_free_floor(monkeypatch):
+    kitchen = SmallKitchen("Mug-1@CounterTop-1")
+    kitchen.do("pick_up(Mug)")
+
+    def crowded(thing):
+        raise SceneError("no free floor")
+
+    monkeypatch.setattr(kitchen.world, "drop", crowded)
+    assert kitchen.env.drop_held() is None
+    assert kitchen.held == "Mug-1"

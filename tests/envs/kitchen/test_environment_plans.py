@@ -5,6 +5,7 @@ import pytest
 from forestall.benchmark.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.benchmark.files import load_scenario, load_task, scenario_names
 from forestall.benchmark.goals import TruthGoalChecker
+from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.envs.kitchen.flat_world import flat_environment
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
@@ -196,3 +197,24 @@ def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
     for subtask in plan.subtasks[8:]:
         assert env.execute(subtask).status is SkillStatus.SUCCEEDED
     assert TruthGoalChecker().check(task.goal, inner.oracle)[0]
+
+
+@pytest.mark.parametrize("task", sorted(PLANS))
+def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task):
+    loaded = load_task(task).task
+    env = KitchenEnvironment(loaded.scene, household())
+    for seed in (101, 102):
+        assert _run(env, _plan(task), seed) == []
+        assert TruthGoalChecker().check(loaded.goal, env.oracle) == (True, True, ())
+
+
+@pytest.mark.parametrize("name", sorted(EXPECTED))
+def test_a_scenario_makes_its_task_fail_in_the_real_kitchen(name):
+    scenario = load_scenario(name)
+    task = load_task(scenario.task).task
+    needs = apply_scene_faults(task.scene, scenario.faults, household())
+    inner = KitchenEnvironment(needs, household())
+    env = wrap(inner, scenario.faults, inner)
+    plan = apply_plan_faults(_plan(task.name), scenario.faults)
+    assert _run(env, plan, 103)[:1] == EXPECTED[name][:1]
+    assert not TruthGoalChecker().check(task.goal, inner.oracle)[0]

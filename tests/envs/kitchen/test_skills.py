@@ -2,6 +2,7 @@ import pytest
 from small_kitchen import SmallKitchen
 
 from forestall.envs.kitchen.skills import SKILL_TABLE, SkillTimes
+from forestall.errors import SceneError
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import SKILLS, Subtask
 
@@ -228,6 +229,30 @@ def test_an_egg_held_before_something_that_takes_none_lands_on_the_floor():
     kitchen = SmallKitchen("Egg-1@DiningTable-1")
     kitchen.do("pick_up(Egg)", "navigate_to_obj(Microwave)", "crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "Floor-1"
+
+
+def test_an_egg_held_over_a_vessel_without_room_lands_below_it():
+    kitchen = SmallKitchen("Egg-1@DiningTable-1", "Pan-1@CounterTop-1", spots={"Pan-1": 0})
+    kitchen.do("pick_up(Egg)", "navigate_to_obj(Pan)", "crack_obj(Egg)")
+    assert kitchen.parent("EggCracked-1") == "CounterTop-1"
+
+
+def test_an_egg_that_finds_no_room_at_all_is_not_cracked():
+    kitchen = SmallKitchen("Egg-1@DiningTable-1", spots={"Floor-1": 0})
+    kitchen.do("pick_up(Egg)", "navigate_to_obj(Microwave)")
+    assert kitchen.refused("crack_obj(Egg)") == "there is no room for what is in Egg-1"
+
+
+def test_what_the_geometry_cannot_do_is_refused_and_changes_nothing(monkeypatch):
+    kitchen = SmallKitchen("Mug-1@CounterTop-1")
+    kitchen.do("pick_up(Mug)")
+
+    def jammed(thing, receptacle):
+        raise SceneError(f"{receptacle} has no room for {thing}")
+
+    monkeypatch.setattr(kitchen.world, "place", jammed)
+    assert kitchen.refused("put_on(Mug, CounterTop-1)") == "CounterTop-1 has no room for Mug-1"
+    assert kitchen.held == "Mug-1"
 
 
 def test_an_egg_that_is_not_held_cracks_where_it_lies():

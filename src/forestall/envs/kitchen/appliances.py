@@ -25,29 +25,49 @@ def fridge(kit: Kit, item: Item, style: Style) -> Forms:
     part.box((0, d / 2, low / 2), (w, d, low), shell, texture="metal")
     part.box((0, d + 0.026, 0.485), (w - 0.004, 0.045, 0.73), shell, texture="metal", solid=False)
     part.box((0, d + 0.010, 0.06), (w - 0.01, 0.02, 0.10), DARK, solid=False)
-    part.box((0, d + 0.075, 0.76), (w * 0.6, 0.018, 0.022), style.handle, texture="metal", solid=False)
+    part.box(
+        (0, d + 0.075, 0.76), (w * 0.6, 0.018, 0.022), style.handle, texture="metal", solid=False
+    )
     for side in (-1, 1):
-        part.box((side * w * 0.26, d + 0.058, 0.76), (0.016, 0.03, 0.016), style.handle, solid=False)
+        part.box(
+            (side * w * 0.26, d + 0.058, 0.76), (0.016, 0.03, 0.016), style.handle, solid=False
+        )
         part.box((side * (w / 2 - t / 2), d / 2, (low + h) / 2), (t, d, h - low), shell)
-        part.box((side * (w / 2 - t - 0.002), d / 2, (low + h) / 2), (0.004, d - 0.01, h - low - 0.01),
-                 _WHITE, solid=False)  # fmt: skip
+        part.box(
+            (side * (w / 2 - t - 0.002), d / 2, (low + h) / 2),
+            (0.004, d - 0.01, h - low - 0.01),
+            _WHITE,
+            solid=False,
+        )
     part.box((0, d / 2, h - t / 2), (w - 2 * t, d, t), shell)
     part.box((0, t / 2, (low + h) / 2), (w - 2 * t, t, h - low), _WHITE)
     part.box((0, d / 2, low + 0.012), (w - 2 * t, d - 0.01, 0.024), _WHITE)
     upper = 1.31
-    part.box((0, (d - 0.09) / 2 + t, upper - 0.006), (w - 2 * t, d - 0.16, 0.012),
-             (0.78, 0.86, 0.88, 1), texture="ceramic")  # fmt: skip
+    part.box(
+        (0, (d - 0.09) / 2 + t, upper - 0.006),
+        (w - 2 * t, d - 0.16, 0.012),
+        (0.78, 0.86, 0.88, 1),
+        texture="ceramic",
+    )
     part.box((0, d - 0.11, upper - 0.004), (w - 2 * t, 0.012, 0.022), STEEL, solid=False)
     part.box((0, 0.20, h - t - 0.006), (0.18, 0.10, 0.012), (1.0, 0.98, 0.88, 1), solid=False)
     _fridge_door(part, item, style, (low, h, d))
     inner = Rect(-w / 2 + t + 0.015, 0.10, w / 2 - t - 0.015, d - 0.05)
     shelf = Rect(inner.x0, inner.y0, inner.x1, d - 0.13)
     regions = (
-        Region(item.name, item.name, inner, low + 0.024, upper - low - 0.06, front_m=d,
-               first_m=d - 0.18),
-        Region(item.name, item.name, shelf, upper, h - t - upper - 0.03, front_m=d,
-               first_m=d - 0.24),
-    )  # fmt: skip
+        Region(
+            item.name,
+            item.name,
+            inner,
+            low + 0.024,
+            upper - low - 0.06,
+            front_m=d,
+            first_m=d - 0.18,
+        ),
+        Region(
+            item.name, item.name, shelf, upper, h - t - upper - 0.03, front_m=d, first_m=d - 0.24
+        ),
+    )
     stance = Stance(d + 0.06, distance_m=0.85, aside_m=-item.hinge * 0.15)
     return {item.name: Form(Rect(-w / 2, 0, w / 2, d + 0.09), h, regions=regions, stance=stance)}
 
@@ -57,11 +77,20 @@ def _fridge_door(
 ) -> None:
     low, h, d = size
     k, w = item.hinge, item.width
-    door = part.swinging("door", (k * w / 2, d + 0.002, 0), (0, 0, 1), "open",
-                         {"closed": 0.0, "open": -k * float(np.deg2rad(105))})  # fmt: skip
+    door = part.swinging(
+        "door",
+        (k * w / 2, d + 0.002, 0),
+        (0, 0, 1),
+        "open",
+        {"closed": 0.0, "open": -k * float(np.deg2rad(105))},
+    )
     middle = (low + h) / 2 + 0.002
-    door.box((-k * w / 2, 0.024, middle), (w - 0.004, 0.045, h - low - 0.008), style.fridge,
-             texture="metal")  # fmt: skip
+    door.box(
+        (-k * w / 2, 0.024, middle),
+        (w - 0.004, 0.045, h - low - 0.008),
+        style.fridge,
+        texture="metal",
+    )
     door.box((-k * w / 2, 0.001, middle), (w - 0.10, 0.002, h - low - 0.10), _WHITE, solid=False)
     x = -k * (w - 0.05)
     door.box((x, 0.072, middle), (0.020, 0.018, 0.55), style.handle, texture="metal", solid=False)
@@ -79,35 +108,70 @@ def microwave(kit: Kit, item: Item, style: Style) -> Forms:
     part.box((0, d / 2, t / 2), (w, d, t), shell, texture="metal")
     part.box((0, d / 2, h - t / 2), (w, d, t), shell, texture="metal")
     part.box((w / 2 - t / 2, d / 2, h / 2), (t, d, h - 2 * t), shell, texture="metal")
-    part.box(((split - w / 2) / 2, d / 2 + 0.011, h / 2), (split + w / 2, d + 0.022, h - 2 * t), shell,
-             texture="metal")  # fmt: skip
+    part.box(
+        ((split - w / 2) / 2, d / 2 + 0.011, h / 2),
+        (split + w / 2, d + 0.022, h - 2 * t),
+        shell,
+        texture="metal",
+    )
     middle, wide = (split + w / 2 - t) / 2, w / 2 - t - split
     part.box((middle, 0.01, h / 2), (wide, 0.02, h - 2 * t), inside)
     part.box((middle, d / 2, t + 0.001), (wide, d - 0.01, 0.002), inside, solid=False)
-    part.cylinder((middle, d / 2 + 0.01, t + 0.004), 0.13, 0.004, (0.72, 0.80, 0.82, 1),
-                  texture="ceramic")  # fmt: skip
+    part.cylinder(
+        (middle, d / 2 + 0.01, t + 0.004), 0.13, 0.004, (0.72, 0.80, 0.82, 1), texture="ceramic"
+    )
     front = d + 0.0225
     panel = (split - w / 2) / 2
     part.box((panel, front, h / 2), (0.105, 0.003, h - 0.05), DARK, solid=False)
     screens = {"off": (0.05, 0.14, 0.10, 1.0), "on": (0.25, 1.0, 0.55, 1.0)}
-    part.box((panel, front + 0.001, h - 0.065), (0.085, 0.004, 0.035), screens["off"],
-             tints=("toggled", screens), solid=False)  # fmt: skip
+    part.box(
+        (panel, front + 0.001, h - 0.065),
+        (0.085, 0.004, 0.035),
+        screens["off"],
+        tints=("toggled", screens),
+        solid=False,
+    )
     for row in range(4):
-        part.box((panel, front + 0.001, 0.06 + 0.035 * row), (0.08, 0.004, 0.02),
-                 (0.45, 0.46, 0.48, 1), solid=False)  # fmt: skip
+        part.box(
+            (panel, front + 0.001, 0.06 + 0.035 * row),
+            (0.08, 0.004, 0.02),
+            (0.45, 0.46, 0.48, 1),
+            solid=False,
+        )
     lamps = {"off": (0.6, 0.6, 0.55, 1.0), "on": (1.0, 0.93, 0.55, 1.0)}
-    part.box((middle, 0.021, h / 2), (wide - 0.01, 0.002, h - 2 * t - 0.01), inside,
-             tints=("toggled", {"off": inside, "on": lamps["on"]}), solid=False)  # fmt: skip
-    door = part.swinging("door", (w / 2, d + 0.001, 0), (0, 0, 1), "open",
-                         {"closed": 0.0, "open": -float(np.deg2rad(105))})  # fmt: skip
+    part.box(
+        (middle, 0.021, h / 2),
+        (wide - 0.01, 0.002, h - 2 * t - 0.01),
+        inside,
+        tints=("toggled", {"off": inside, "on": lamps["on"]}),
+        solid=False,
+    )
+    door = part.swinging(
+        "door",
+        (w / 2, d + 0.001, 0),
+        (0, 0, 1),
+        "open",
+        {"closed": 0.0, "open": -float(np.deg2rad(105))},
+    )
     span = w / 2 - split - 0.003
     door.box((-span / 2, 0.0105, h / 2), (span, 0.019, h - 0.004), shell, texture="metal")
     windows = {"off": (0.05, 0.055, 0.06, 1.0), "on": (1.0, 0.78, 0.28, 1.0)}
-    door.box((-span / 2, 0.0205, h / 2), (span - 0.09, 0.003, h - 0.09), windows["off"],
-             texture="ceramic", tints=("toggled", windows), solid=False)  # fmt: skip
+    door.box(
+        (-span / 2, 0.0205, h / 2),
+        (span - 0.09, 0.003, h - 0.09),
+        windows["off"],
+        texture="ceramic",
+        tints=("toggled", windows),
+        solid=False,
+    )
     door.box((-span / 2, 0.0005, h / 2), (span - 0.09, 0.001, h - 0.09), DARK, solid=False)
-    door.box((-span + 0.022, 0.036, h / 2), (0.014, 0.016, h * 0.7), style.handle, texture="metal",
-             solid=False)  # fmt: skip
+    door.box(
+        (-span + 0.022, 0.036, h / 2),
+        (0.014, 0.016, h * 0.7),
+        style.handle,
+        texture="metal",
+        solid=False,
+    )
     area = Rect(middle - wide / 2 + 0.004, 0.024, middle + wide / 2 - 0.004, d - 0.006)
     region = Region(item.name, item.name, area, t + 0.0065, h - 2 * t - 0.014, kind="spot")
     stance = Stance(COUNTER_DEPTH_M - item.inset, distance_m=0.70, aside_m=-0.10)
@@ -130,11 +194,19 @@ def coffee_machine(kit: Kit, item: Item, style: Style) -> Forms:
     part.cylinder((0, 0.215, 0.247), 0.018, 0.018, DARK, solid=False)
     part.cylinder((0, 0.122, 0.15), 0.05, 0.004, STEEL, quat=(0.70711, 0.70711, 0, 0), solid=False)
     lamps = {"off": (0.20, 0.05, 0.05, 1.0), "on": (0.20, 1.0, 0.25, 1.0)}
-    part.cylinder((-0.05, 0.263, 0.31), 0.014, 0.008, lamps["off"], quat=(0.70711, 0.70711, 0, 0),
-                  tints=("toggled", lamps), solid=False)  # fmt: skip
+    part.cylinder(
+        (-0.05, 0.263, 0.31),
+        0.014,
+        0.008,
+        lamps["off"],
+        quat=(0.70711, 0.70711, 0, 0),
+        tints=("toggled", lamps),
+        solid=False,
+    )
     bars = {"off": (0.30, 0.30, 0.31, 1.0), "on": (1.0, 0.72, 0.15, 1.0)}
-    part.box((0.045, 0.262, 0.31), (0.09, 0.005, 0.04), bars["off"], tints=("toggled", bars),
-             solid=False)  # fmt: skip
+    part.box(
+        (0.045, 0.262, 0.31), (0.09, 0.005, 0.04), bars["off"], tints=("toggled", bars), solid=False
+    )
     area = Rect(-w / 2, 0.125, w / 2, d)
     region = Region(item.name, item.name, area, 0.0305, 0.205, kind="spot")
     stance = Stance(COUNTER_DEPTH_M - item.inset, distance_m=0.76)
@@ -161,8 +233,15 @@ def toaster(kit: Kit, item: Item, style: Style) -> Forms:
         part.box((0.07, d + 0.012, at), (0.045, 0.024, 0.016), DARK, when=when, solid=False)
     part.box((0.07, d + 0.001, 0.11), (0.012, 0.002, 0.12), DARK, solid=False)
     lamps = {"off": (0.25, 0.10, 0.05, 1.0), "on": (1.0, 0.40, 0.05, 1.0)}
-    part.cylinder((-0.07, d + 0.002, 0.10), 0.013, 0.006, lamps["off"],
-                  quat=(0.70711, 0.70711, 0, 0), tints=("toggled", lamps), solid=False)  # fmt: skip
+    part.cylinder(
+        (-0.07, d + 0.002, 0.10),
+        0.013,
+        0.006,
+        lamps["off"],
+        quat=(0.70711, 0.70711, 0, 0),
+        tints=("toggled", lamps),
+        solid=False,
+    )
     for y in (0.1012, 0.1288, 0.0425, 0.0675):
         part.box((0, y, h), (0.13, 0.004, 0.006), (1.0, 0.32, 0.05, 1), when=on, solid=False)
     for side in (-1, 1):
@@ -171,4 +250,3 @@ def toaster(kit: Kit, item: Item, style: Style) -> Forms:
     region = Region(item.name, item.name, slot, deep + 0.0025, kind="slot")
     stance = Stance(COUNTER_DEPTH_M - item.inset, distance_m=0.62)
     return {item.name: Form(Rect(-w / 2, 0, w / 2, d + 0.02), h, regions=(region,), stance=stance)}
-

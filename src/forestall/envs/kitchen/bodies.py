@@ -55,9 +55,7 @@ class Bodies:
         self._regions: dict[str, int] = {}
         self.states = {name: dict(values) for name, values in states.items()}
         self.present: set[str] = {n for n in forms if n not in compiled.free}
-        self._body = {
-            self.model.body(b).name: b for b in range(self.model.nbody)
-        }
+        self._body = {self.model.body(b).name: b for b in range(self.model.nbody)}
         self._instance_geoms: dict[str, list[int]] = {}
         for geom, index in enumerate(compiled.appearance.geom_instance.tolist()):
             if index >= 0:

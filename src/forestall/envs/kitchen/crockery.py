@@ -1,7 +1,8 @@
-"""Builds vessels, dishes, bottles and plants, with their liquids, stains and shards."""
+"""Builds vessels, dishes and bottles, with their liquids, stains and shards."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -96,7 +97,11 @@ def _walls(radius: float, height: float, flare: float, thick: float, neck: float
     for t in steps:
         r = foot + (radius - foot) * float(np.sin(t * np.pi / 2) ** 0.85)
         if neck != 1:
-            r = radius * (0.94 + 0.06 * min(1.0, t * 4)) * (1 - (1 - neck) * max(t - 0.35, 0) / 0.65)
+            r = (
+                radius
+                * (0.94 + 0.06 * min(1.0, t * 4))
+                * (1 - (1 - neck) * max(t - 0.35, 0) / 0.65)
+            )
         outer.append((r, float(t) * height))
     floor = min(max(2 * thick, 0.006), 0.012)
     inner = [
@@ -188,12 +193,17 @@ def _handles(
     if kettle:
         top, out = height * 1.28, radius * 0.72
         arc = [(-out, height * 0.80), (-out * 0.75, top), (out * 0.75, top), (out, height * 0.80)]
-        for (y0, z0), (y1, z1) in zip(arc, arc[1:], strict=False):
+        for (y0, z0), (y1, z1) in itertools.pairwise(arc):
             part.capsule((0, y0, z0), (0, y1, z1), 0.008, dark, when=whole, solid=False)
         part.capsule(
-            (radius * 0.8, 0, height * 0.45), (radius + 0.035, 0, height * 0.80), 0.013, rgba,
-            texture="metal", when=whole, solid=False,
-        )  # fmt: skip
+            (radius * 0.8, 0, height * 0.45),
+            (radius + 0.035, 0, height * 0.80),
+            0.013,
+            rgba,
+            texture="metal",
+            when=whole,
+            solid=False,
+        )
         return Rect(footprint.x0, footprint.y0, radius + 0.05, footprint.y1)
     if radius < 0.06:
         return _ring_handle(part, footprint, walls, height, rgba, whole)
@@ -201,8 +211,9 @@ def _handles(
     for side in (-1, 1):
         x = side * (radius + 0.018)
         for y in (-0.03, 0.03):
-            part.capsule((side * (radius - 0.005), y, z), (x, y, z), 0.006, dark, when=whole,
-                         solid=False)  # fmt: skip
+            part.capsule(
+                (side * (radius - 0.005), y, z), (x, y, z), 0.006, dark, when=whole, solid=False
+            )
         part.capsule((x, -0.03, z), (x, 0.03, z), 0.007, dark, when=whole)
     return Rect(footprint.x0 - 0.027, footprint.y0, footprint.x1 + 0.027, footprint.y1)
 
@@ -215,7 +226,7 @@ def _ring_handle(
     low, high = height * 0.27, height * 0.75
     low_r = float(np.interp(low, [z for _, z in walls.outer], [r for r, _ in walls.outer]))
     line = [(low_r - 0.002, low), (out, low + 0.01), (out, high - 0.01), (radius - 0.004, high)]
-    for (x0, z0), (x1, z1) in zip(line, line[1:], strict=False):
+    for (x0, z0), (x1, z1) in itertools.pairwise(line):
         part.capsule((x0, 0, z0), (x1, 0, z1), 0.0055, rgba, texture="ceramic", when=whole)
     return Rect(footprint.x0, footprint.y0, out + 0.006, footprint.y1)
 
@@ -316,56 +327,30 @@ def bottle(part: Assembly, category: str, shape: Mapping[str, Any], states: froz
     glass = chosen(category, rng)
     light = (0.42, 0.56, 0.40, 1.0)
     shoulder, neck = height * 0.62, height * 0.76
-    line = [(0, 0), (r * 0.96, 0.0), (r, 0.006), (r, shoulder), (r * 0.36, neck),
-            (r * 0.34, height * 0.97), (r * 0.40, height * 0.975), (r * 0.40, height), (0, height)]  # fmt: skip
+    line = [
+        (0, 0),
+        (r * 0.96, 0.0),
+        (r, 0.006),
+        (r, shoulder),
+        (r * 0.36, neck),
+        (r * 0.34, height * 0.97),
+        (r * 0.40, height * 0.975),
+        (r * 0.40, height),
+        (0, height),
+    ]
     part.mesh(meshes.lathe(line, 20), light if "filled" in states else glass, texture="ceramic")
     if "filled" in states:
         full = [(r + 0.0008, 0.004), (r + 0.0008, shoulder), (r * 0.42, neck), (r * 0.36, neck)]
         shades = {k: darker(glass, 0.35) if k == "wine" else v for k, v in LIQUIDS.items()}
         part.mesh(
-            meshes.lathe(full, 20), glass, texture="ceramic",
-            when={"filled": tuple(LIQUIDS)}, tints=("filled", shades),
-        )  # fmt: skip
+            meshes.lathe(full, 20),
+            glass,
+            texture="ceramic",
+            when={"filled": tuple(LIQUIDS)},
+            tints=("filled", shades),
+        )
     label = [(r + 0.0015, height * 0.18), (r + 0.0015, height * 0.42)]
     part.mesh(meshes.lathe(label, 20), (0.90, 0.86, 0.74, 1))
     part.cylinder((0, 0, height * 0.97), r * 0.42, height * 0.06, chosen("", rng), solid=False)
     part.proxy((0, 0, height / 2), r, height)
     return Form(Rect(-r, -r, r, r), height, r)
-
-
-def plant(part: Assembly, category: str, shape: Mapping[str, Any], states: frozenset[str]) -> Form:
-    """A potted plant; the soil is dark and wet once it has been watered."""
-    rng = part.kit.rng
-    sx, _, height = (float(s) for s in shape["size_m"])
-    r, tall = sx / 2 * 0.72, height * 0.38
-    clay = chosen("", rng, ((0.68, 0.36, 0.24, 1), (0.85, 0.84, 0.80, 1), (0.35, 0.42, 0.45, 1)))
-    line = [(0, 0), (r * 0.72, 0), (r * 0.96, tall * 0.85), (r, tall * 0.86), (r, tall),
-            (r * 0.88, tall), (r * 0.86, tall * 0.84), (0, tall * 0.84)]  # fmt: skip
-    part.mesh(meshes.lathe(line, 20), clay, texture="ceramic")
-    dry, wet = (0.52, 0.40, 0.28, 1), (0.16, 0.095, 0.055, 1)
-    soil = {"empty": dry, **dict.fromkeys(LIQUIDS, wet)}
-    part.cylinder(
-        (0, 0, tall * 0.88), r * 0.86, tall * 0.06, dry, texture="food", tints=("filled", soil),
-        solid=False,
-    )  # fmt: skip
-    if "filled" in states:
-        sheen = []
-        for k in range(5):
-            a = 2 * np.pi * k / 5 + float(rng.uniform(-0.3, 0.3))
-            pool = meshes.extrude(meshes.blob(r * 0.22, rng, 8), 0, 0.001)
-            x, y = float(r * 0.58 * np.cos(a)), float(r * 0.58 * np.sin(a))
-            sheen.append(meshes.moved(pool, x, y, tall * 0.913))
-        part.mesh(meshes.merged(sheen), LIQUIDS["water"], when={"filled": tuple(LIQUIDS)})
-    green = chosen("", rng, ((0.20, 0.42, 0.16, 1), (0.27, 0.48, 0.20, 1), (0.16, 0.36, 0.22, 1)))
-    leaves = []
-    for k in range(15):
-        length = float(rng.uniform(0.8, 1.0)) * sx / 2
-        base = tall + (height - tall) * (0.12 + 0.55 * k / 15)
-        droop = float(rng.uniform(0.45, 0.75))
-        one = meshes.leaf(length, length * 0.42, droop)
-        leaves.append(meshes.moved(one, 0, 0, base, 2.4 * k + float(rng.uniform(-0.3, 0.3))))
-    part.mesh(meshes.merged(leaves), green)
-    stem = (0.30, 0.34, 0.16, 1)
-    part.capsule((0, 0, tall * 0.85), (0, 0, height * 0.92), 0.006, stem, solid=False)
-    part.proxy((0, 0, height / 2), sx / 2, height)
-    return Form(Rect(-sx / 2, -sx / 2, sx / 2, sx / 2), height, sx / 2)

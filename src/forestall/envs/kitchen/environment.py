@@ -17,7 +17,7 @@ from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.envs.kitchen import effects
 from forestall.envs.kitchen.household import Household, Placed
 from forestall.envs.kitchen.skills import Robot, SkillTimes, perform
-from forestall.errors import ForestallError
+from forestall.errors import ForestallError, SceneError
 from forestall.interfaces import Renderer, World
 from forestall.types.episode import Event, SkillOutcome
 from forestall.types.graph import SceneGraph
@@ -180,15 +180,19 @@ class KitchenEnvironment:
         return outcome
 
     def drop_held(self, hard: bool = False) -> str | None:
-        """Let go of the held object where the robot is; its name, None for an empty hand.
+        """Let go of the held object where the robot is; its name, None when nothing fell.
 
-        What falls stays intact, an egg apart, unless the fall is hard.
+        What falls stays intact, an egg apart, unless the fall is hard. Nothing falls from an empty
+        hand or where there is no free floor.
         """
         household = self._acting.household
         held = household.held
         if held is None:
             return None
-        household.fall(held)
+        try:
+            household.fall(held)
+        except SceneError:
+            return None
         effects.crash(household, held, hard)
         effects.settle(household, self._effect_config)
         return held

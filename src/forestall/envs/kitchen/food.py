@@ -55,9 +55,13 @@ def ellipsoid(
     look: dict[str, Any] = {"texture": "food"} | _cooking(states, skin, _browned(skin))
     if category == "Egg":
         part.ellipsoid(
-            (0, 0, radii[2]), radii, skin, texture="ceramic", solid=False,
+            (0, 0, radii[2]),
+            radii,
+            skin,
+            texture="ceramic",
+            solid=False,
             when={"broken": ("intact",)} if "broken" in states else None,
-        )  # fmt: skip
+        )
         if "broken" in states:
             _mess(part, sx, skin)
     else:
@@ -69,9 +73,7 @@ def ellipsoid(
     return Form(footprint, sz, max(radii[0], radii[1]))
 
 
-def _greens(
-    part: Assembly, category: str, radii: tuple[float, float, float], skin: Rgba
-) -> None:
+def _greens(part: Assembly, category: str, radii: tuple[float, float, float], skin: Rgba) -> None:
     rng = part.kit.rng
     if category == "Lettuce":
         leaves = []
@@ -101,10 +103,12 @@ def _mess(part: Assembly, size: float, shell: Rgba) -> None:
     """A broken egg: white and yolk run out between pieces of shell."""
     rng = part.kit.rng
     broken: When = {"broken": ("broken",)}
-    part.mesh(meshes.extrude(meshes.blob(size * 1.1, rng), 0, 0.003), (0.93, 0.91, 0.80, 1),
-              when=broken)  # fmt: skip
-    part.ellipsoid((0, 0, 0.004), (0.016, 0.015, 0.006), (0.95, 0.66, 0.10, 1), when=broken,
-                   solid=False)  # fmt: skip
+    part.mesh(
+        meshes.extrude(meshes.blob(size * 1.1, rng), 0, 0.003), (0.93, 0.91, 0.80, 1), when=broken
+    )
+    part.ellipsoid(
+        (0, 0, 0.004), (0.016, 0.015, 0.006), (0.95, 0.66, 0.10, 1), when=broken, solid=False
+    )
     pieces = []
     for k in range(4):
         piece = meshes.extrude(meshes.blob(size * 0.3, rng, 5), 0, 0.008)
@@ -135,10 +139,19 @@ def _bread_outline(width: float, height: float) -> list[tuple[float, float]]:
     """Cross-section of a loaf: flat below, rounded and bulging above; from y = -w/2, z = 0."""
     w, h = width / 2, height
     return [
-        (-0.86 * w, 0), (0.86 * w, 0), (0.90 * w, 0.5 * h), (w, 0.66 * h), (0.94 * w, 0.84 * h),
-        (0.62 * w, 0.97 * h), (0.2 * w, h), (-0.2 * w, h), (-0.62 * w, 0.97 * h),
-        (-0.94 * w, 0.84 * h), (-w, 0.66 * h), (-0.90 * w, 0.5 * h),
-    ]  # fmt: skip
+        (-0.86 * w, 0),
+        (0.86 * w, 0),
+        (0.90 * w, 0.5 * h),
+        (w, 0.66 * h),
+        (0.94 * w, 0.84 * h),
+        (0.62 * w, 0.97 * h),
+        (0.2 * w, h),
+        (-0.2 * w, h),
+        (-0.62 * w, 0.97 * h),
+        (-0.94 * w, 0.84 * h),
+        (-w, 0.66 * h),
+        (-0.90 * w, 0.5 * h),
+    ]
 
 
 def _upright(mesh: meshes.Mesh) -> meshes.Mesh:
@@ -175,7 +188,9 @@ def slab(part: Assembly, category: str, shape: Mapping[str, Any], states: frozen
             seeds.append(meshes.moved(pocket, sx * 0.24 * np.cos(a), sx * 0.24 * np.sin(a), 0))
         part.mesh(meshes.merged(seeds), (0.93, 0.62, 0.28, 1))
     if of == "Lettuce":
-        rib = meshes.extrude([(-0.003, -sy * 0.4), (0.003, -sy * 0.4), (0, sy * 0.4)], sz, sz + 6e-4)
+        rib = meshes.extrude(
+            [(-0.003, -sy * 0.4), (0.003, -sy * 0.4), (0, sy * 0.4)], sz, sz + 6e-4
+        )
         part.mesh(rib, (0.90, 0.93, 0.74, 1))
     if of == "Bread":
         part.proxy_box((0, 0, sz / 2), (sx, sy, sz))
@@ -198,12 +213,17 @@ def egg_cracked(
     wide = [(x * 1.0, y * 1.0) for x, y in outline]
     rim = [(x * 0.86, y * 0.86) for x, y in outline]
     tints = _cooking(states, raw, firm)
-    part.mesh(meshes.extrude(wide, 0, sz * 0.20), raw, **_cooking(states, raw, (0.62, 0.40, 0.17, 1)))
+    part.mesh(
+        meshes.extrude(wide, 0, sz * 0.20), raw, **_cooking(states, raw, (0.62, 0.40, 0.17, 1))
+    )
     part.mesh(meshes.extrude(rim, 0, sz * 0.34), raw, **tints)
     yolk, done = (0.97, 0.62, 0.06, 1.0), (0.93, 0.73, 0.30, 1.0)
     part.ellipsoid(
-        (0, 0, sz * 0.36), (r * 0.40, r * 0.38, sz * 0.6), yolk, solid=False,
+        (0, 0, sz * 0.36),
+        (r * 0.40, r * 0.38, sz * 0.6),
+        yolk,
+        solid=False,
         **_cooking(states, yolk, done),
-    )  # fmt: skip
+    )
     part.proxy((0, 0, sz * 0.2), r, sz * 0.4)
     return Form(Rect(-r, -r, r, r), sz, r)

@@ -140,6 +140,27 @@ class Form:
     hollow_m: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """One thing or fixture of a scene as it starts.
+
+    Args:
+        name: instance name.
+        category: its category.
+        parent: receptacle that it starts on or in; FLOOR for the floor; None for fixtures.
+        states: (attribute, value) pairs.
+        prepared: not there yet; waits to replace something.
+        made_from: of a prepared thing: what it replaces.
+    """
+
+    name: str
+    category: str
+    parent: str | None
+    states: tuple[tuple[str, str], ...]
+    prepared: bool = False
+    made_from: str | None = None
+
+
 def pose_at(x: float, y: float, z: float, yaw_rad: float = 0.0) -> Pose:
     """Upright pose."""
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)

@@ -41,7 +41,9 @@ def counter(kit: Kit, item: Item, style: Style) -> Forms:
         _plate(part, r, _SLAB, COUNTER_HEIGHT_M, style)
     part.box((0, 0.26, _TOE / 2), (w, 0.52, _TOE), DARK)
     mid = (_TOE + _BAND) / 2
-    part.box((0, _FACE / 2, mid), (w, _FACE, _BAND - _TOE), style.front, texture=style.front_texture)
+    part.box(
+        (0, _FACE / 2, mid), (w, _FACE, _BAND - _TOE), style.front, texture=style.front_texture
+    )
     columns = columns_of(w)
     free = drawer_columns(w, sink_x)
     drawers = dict(zip(item.drawers, reversed(free), strict=False))
@@ -89,8 +91,9 @@ def _around(outer: Rect, hole: Rect | None) -> list[Rect]:
 
 def _plate(part: Assembly, r: Rect, low: float, high: float, style: Style) -> None:
     (x, y), (sx, sy) = r.centre, r.size
-    part.box((x, y, (low + high) / 2), (sx, sy, high - low), style.counter,
-             texture=style.counter_texture)  # fmt: skip
+    part.box(
+        (x, y, (low + high) / 2), (sx, sy, high - low), style.counter, texture=style.counter_texture
+    )
 
 
 def _upper_band(
@@ -105,7 +108,9 @@ def _upper_band(
         x = max(x, b)
     if hole is not None:
         x = (hole.x0 + hole.x1) / 2
-        part.box((x, _FACE - 0.01, z), (hole.x1 - hole.x0 + 0.024, 0.02, _SLAB - _BAND), style.front)
+        part.box(
+            (x, _FACE - 0.01, z), (hole.x1 - hole.x0 + 0.024, 0.02, _SLAB - _BAND), style.front
+        )
 
 
 def _front(
@@ -113,12 +118,22 @@ def _front(
 ) -> None:
     """A door or drawer front with its handle."""
     mid, width = (x0 + x1) / 2, x1 - x0 - 0.008
-    part.box((mid, _FACE + 0.009, (z0 + z1) / 2), (width, 0.018, z1 - z0), style.front,
-             texture=style.front_texture, solid=False)  # fmt: skip
+    part.box(
+        (mid, _FACE + 0.009, (z0 + z1) / 2),
+        (width, 0.018, z1 - z0),
+        style.front,
+        texture=style.front_texture,
+        solid=False,
+    )
     inset = (width - 0.10, 0.004, z1 - z0 - 0.10)
     if bar_up:
-        part.box((mid, _FACE + 0.018, (z0 + z1) / 2), inset, darker(style.front, 0.90),
-                 texture=style.front_texture, solid=False)  # fmt: skip
+        part.box(
+            (mid, _FACE + 0.018, (z0 + z1) / 2),
+            inset,
+            darker(style.front, 0.90),
+            texture=style.front_texture,
+            solid=False,
+        )
     _bar(part, mid, _FACE + 0.018, z1 - 0.035 if bar_up else (z0 + z1) / 2, style)
 
 
@@ -128,9 +143,7 @@ def _bar(part: Assembly, x: float, y: float, z: float, style: Style) -> None:
         part.box((x + side, y + 0.008, z), (0.01, 0.018, 0.01), style.handle, solid=False)
 
 
-def _drawer(
-    kit: Kit, item: Item, name: str, column: tuple[float, float], style: Style
-) -> Form:
+def _drawer(kit: Kit, item: Item, name: str, column: tuple[float, float], style: Style) -> Form:
     x = (column[0] + column[1]) / 2
     w, deep = column[1] - column[0] - 0.03, 0.50
     part = kit.furniture(name, name, item.local_pose(x, 0.0))
@@ -144,8 +157,12 @@ def _drawer(
     slide.box((0, back + 0.006, z), (w - 0.024, 0.012, high - low), tone)
     slide.box((0, _FACE - 0.006, z), (w - 0.024, 0.012, high - low), tone)
     half = (column[1] - column[0]) / 2
-    slide.box((0, _FACE + 0.009, (_BAND + _SLAB) / 2), (2 * half - 0.008, 0.018, 0.188), style.front,
-              texture=style.front_texture)  # fmt: skip
+    slide.box(
+        (0, _FACE + 0.009, (_BAND + _SLAB) / 2),
+        (2 * half - 0.008, 0.018, 0.188),
+        style.front,
+        texture=style.front_texture,
+    )
     _bar(slide, 0, _FACE + 0.018, (_BAND + _SLAB) / 2, style)
     area = Rect(-w / 2 + 0.018, _FACE - 0.31, w / 2 - 0.018, _FACE - 0.018)
     region = Region(name, f"{name}/slide", area, low + 0.01, high + 0.03 - low)
@@ -163,23 +180,41 @@ def _sink(kit: Kit, item: Item, sink_x: float, hole: Rect) -> Forms:
     floor = COUNTER_HEIGHT_M - deep
     z, tall = (top + floor) / 2, top - floor
     for side in (-1, 1):
-        part.box((side * (sx / 2 - thick / 2), _SINK_Y, z), (thick, sy, tall), STEEL, texture="metal")
+        part.box(
+            (side * (sx / 2 - thick / 2), _SINK_Y, z), (thick, sy, tall), STEEL, texture="metal"
+        )
         y = _SINK_Y + side * (sy / 2 - thick / 2)
         part.box((0, y, z), (sx, thick, tall), STEEL, texture="metal")
     for side in (-1, 1):
-        part.box((side * (sx / 2 + 0.006), _SINK_Y, top - 0.0015), (0.024, sy + 0.03, 0.003),
-                 darker(STEEL, 1.1), texture="metal", solid=False)  # fmt: skip
-        part.box((0, _SINK_Y + side * (sy / 2 + 0.006), top - 0.0015), (sx + 0.03, 0.024, 0.003),
-                 darker(STEEL, 1.1), texture="metal", solid=False)  # fmt: skip
-    part.box((0, _SINK_Y, floor + 0.004), (sx - 2 * thick, sy - 2 * thick, 0.008),
-             darker(STEEL, 0.92), texture="metal")  # fmt: skip
+        part.box(
+            (side * (sx / 2 + 0.006), _SINK_Y, top - 0.0015),
+            (0.024, sy + 0.03, 0.003),
+            darker(STEEL, 1.1),
+            texture="metal",
+            solid=False,
+        )
+        part.box(
+            (0, _SINK_Y + side * (sy / 2 + 0.006), top - 0.0015),
+            (sx + 0.03, 0.024, 0.003),
+            darker(STEEL, 1.1),
+            texture="metal",
+            solid=False,
+        )
+    part.box(
+        (0, _SINK_Y, floor + 0.004),
+        (sx - 2 * thick, sy - 2 * thick, 0.008),
+        darker(STEEL, 0.92),
+        texture="metal",
+    )
     part.cylinder((0, _SINK_Y, floor + 0.009), 0.035, 0.003, darker(STEEL, 0.45), solid=False)
     area = Rect(-sx / 2, _SINK_Y - sy / 2, sx / 2, _SINK_Y + sy / 2).grown(-thick - 0.004)
     region = Region(basin_name, basin_name, area, floor + 0.0105, first_m=_SINK_Y + 0.02)
     basin = Form(
-        Rect(-sx / 2 - 0.02, _SINK_Y - sy / 2 - 0.02, sx / 2 + 0.02, _SINK_Y + sy / 2 + 0.02), top,
-        regions=(region,), stance=Stance(COUNTER_DEPTH_M, distance_m=0.6),
-    )  # fmt: skip
+        Rect(-sx / 2 - 0.02, _SINK_Y - sy / 2 - 0.02, sx / 2 + 0.02, _SINK_Y + sy / 2 + 0.02),
+        top,
+        regions=(region,),
+        stance=Stance(COUNTER_DEPTH_M, distance_m=0.6),
+    )
     return {basin_name: basin, faucet_name: _faucet(kit, item, sink_x, faucet_name, floor + 0.011)}
 
 
@@ -191,16 +226,18 @@ def _faucet(kit: Kit, item: Item, sink_x: float, name: str, floor: float) -> For
     part.capsule((0, 0.09, z0 + 0.02), (0, 0.09, z1 - 0.05), 0.012, metal, texture="metal")
     part.capsule((0, 0.09, z1 - 0.05), (0, 0.13, z1), 0.012, metal, texture="metal", solid=False)
     part.capsule((0, 0.13, z1), (0, reach - 0.04, z1), 0.012, metal, texture="metal", solid=False)
-    part.capsule((0, reach - 0.04, z1), (0, reach, z1 - 0.05), 0.011, metal, texture="metal",
-                 solid=False)  # fmt: skip
+    part.capsule(
+        (0, reach - 0.04, z1), (0, reach, z1 - 0.05), 0.011, metal, texture="metal", solid=False
+    )
     lever = part.swinging("lever", (0.05, 0.09, z0), (0, 0, 1), "toggled", {"off": 0.0, "on": 1.0})
     lever.cylinder((0, 0, 0.025), 0.016, 0.05, metal, texture="metal", solid=False)
     lever.capsule((0, 0, 0.055), (0.06, 0, 0.075), 0.006, metal, texture="metal", solid=False)
     lever.box((0.066, 0, 0.078), (0.02, 0.02, 0.016), (0.2, 0.45, 0.85, 1), solid=False)
     water, on = (0.62, 0.82, 0.96, 1.0), {"toggled": ("on",)}
     stream = z1 - 0.06
-    part.cylinder((0, reach, (stream + floor) / 2), 0.009, stream - floor, water, when=on,
-                  solid=False)  # fmt: skip
+    part.cylinder(
+        (0, reach, (stream + floor) / 2), 0.009, stream - floor, water, when=on, solid=False
+    )
     pool = [(0.0, 0.0), (0.10, 0.0), (0.085, 0.002), (0.0, 0.003)]
     part.mesh(meshes.lathe(pool, 18), water, at=(0, reach, floor), when=on)
     box = Rect(-0.03, 0.06, 0.13, reach + 0.01)
@@ -213,18 +250,35 @@ def stove(kit: Kit, item: Item, style: Style) -> Forms:
     w, d, top = item.width, 0.60, 0.90
     body = style.appliance
     part.box((0, 0.26, _TOE / 2), (w - 0.02, 0.52, _TOE), DARK)
-    part.box((0, d / 2, (_TOE + top) / 2 - 0.006), (w - 0.006, d, top - _TOE - 0.012), body,
-             texture="metal")  # fmt: skip
+    part.box(
+        (0, d / 2, (_TOE + top) / 2 - 0.006),
+        (w - 0.006, d, top - _TOE - 0.012),
+        body,
+        texture="metal",
+    )
     part.box((0, 0.31, top - 0.006), (w - 0.006, COUNTER_DEPTH_M, 0.012), DARK, texture="ceramic")
-    part.box((0, d + 0.012, 0.46), (w - 0.05, 0.024, 0.46), darker(body, 0.95), texture="metal",
-             solid=False)  # fmt: skip
+    part.box(
+        (0, d + 0.012, 0.46),
+        (w - 0.05, 0.024, 0.46),
+        darker(body, 0.95),
+        texture="metal",
+        solid=False,
+    )
     part.box((0, d + 0.0245, 0.45), (w - 0.22, 0.004, 0.26), DARK, texture="ceramic", solid=False)
     part.box((0, d + 0.055, 0.665), (w - 0.14, 0.016, 0.018), STEEL, texture="metal", solid=False)
     for side in (-1, 1):
-        part.box((side * (w / 2 - 0.09), d + 0.035, 0.665), (0.014, 0.04, 0.014), STEEL, solid=False)
+        part.box(
+            (side * (w / 2 - 0.09), d + 0.035, 0.665), (0.014, 0.04, 0.014), STEEL, solid=False
+        )
     tilt = float(np.deg2rad(-52))
-    part.box((0, d + 0.012, 0.80), (w - 0.03, 0.10, 0.012), darker(body, 0.9), texture="metal",
-             quat=quaternion((1, 0, 0), tilt), solid=False)  # fmt: skip
+    part.box(
+        (0, d + 0.012, 0.80),
+        (w - 0.03, 0.10, 0.012),
+        darker(body, 0.9),
+        texture="metal",
+        quat=quaternion((1, 0, 0), tilt),
+        solid=False,
+    )
     _hood(kit, item, style)
     forms: Forms = {}
     places = [(0.18, 0.455), (-0.18, 0.455), (0.18, 0.165), (-0.18, 0.165)]
@@ -259,9 +313,11 @@ def _burner(kit: Kit, item: Item, name: str, at: tuple[float, float], top: float
     turn_rad = -float(np.sign(x)) * float(np.deg2rad(40 if y > 0.3 else 65))
     region = Region(name, name, area, 0.0225, kind="spot", yaw_rad=turn_rad)
     return Form(
-        Rect(-0.134, -0.134, 0.134, 0.134), 0.022, regions=(region,),
+        Rect(-0.134, -0.134, 0.134, 0.134),
+        0.022,
+        regions=(region,),
         stance=Stance(COUNTER_DEPTH_M - y, distance_m=0.62),
-    )  # fmt: skip
+    )
 
 
 def _knob(
@@ -271,8 +327,9 @@ def _knob(
     part = kit.furniture(name, name, (px, py, z, yaw))
     normal = (0.0, float(-np.sin(tilt)), float(np.cos(tilt)))
     up = (0.0, float(-np.cos(tilt)), float(-np.sin(tilt)))
-    dial = part.swinging("dial", (0, 0, 0), normal, "toggled", {"off": 0.0, "on": -1.6},
-                         follows=burner)  # fmt: skip
+    dial = part.swinging(
+        "dial", (0, 0, 0), normal, "toggled", {"off": 0.0, "on": -1.6}, follows=burner
+    )
     turn = quaternion((1, 0, 0), tilt)
     at = (0.0, normal[1] * 0.014, normal[2] * 0.014)
     dial.cylinder(at, 0.024, 0.028, DARK, quat=turn, texture="metal", solid=False)
@@ -300,32 +357,3 @@ def corner(kit: Kit, item: Item, style: Style) -> Forms:
     part.box((0, d / 2, _SLAB / 2), (w, d, _SLAB), style.front, texture=style.front_texture)
     part.box((0, 0.005, 1.12), (w, 0.01, 0.44), style.splash, texture="tiles")
     return {}
-
-
-def cabinet(kit: Kit, item: Item, style: Style) -> Forms:
-    """A wall cabinet above a counter, hinged at the side `item.hinge`."""
-    z0, w, d, h, t = item.z, item.width, 0.33, 0.60, 0.018
-    part = kit.furniture(item.name, item.name, (item.x, item.y, z0, item.yaw))
-    inside = darker(style.front, 1.05)
-    for side in (-1, 1):
-        part.box((side * (w / 2 - t / 2), d / 2, h / 2), (t, d, h), style.front,
-                 texture=style.front_texture)  # fmt: skip
-    for z in (t / 2, h - t / 2):
-        part.box((0, d / 2, z), (w - 2 * t, d, t), style.front, texture=style.front_texture)
-    part.box((0, 0.005, h / 2), (w - 2 * t, 0.01, h - 2 * t), inside)
-    k = item.hinge
-    angle = -k * float(np.deg2rad(105))
-    door = part.swinging("door", (k * w / 2, d + 0.001, 0), (0, 0, 1), "open",
-                         {"closed": 0.0, "open": angle})  # fmt: skip
-    door.box((-k * w / 2, 0.010, h / 2), (w - 0.006, 0.018, h - 0.006), style.front,
-             texture=style.front_texture)  # fmt: skip
-    door.box((-k * w / 2, 0.020, h / 2), (w - 0.12, 0.004, h - 0.12), darker(style.front, 0.90),
-             texture=style.front_texture, solid=False)  # fmt: skip
-    door.box((-k * (w - 0.05), 0.034, 0.12), (0.012, 0.010, 0.14), style.handle, texture="metal",
-             solid=False)  # fmt: skip
-    for z in (0.06, 0.18):
-        door.box((-k * (w - 0.05), 0.026, z), (0.01, 0.02, 0.01), style.handle, solid=False)
-    area = Rect(-w / 2 + t + 0.006, 0.03, w / 2 - t - 0.006, d - 0.02)
-    region = Region(item.name, item.name, area, t, h - 2 * t - 0.01, front_m=d)
-    stance = Stance(COUNTER_DEPTH_M, distance_m=0.62, aside_m=-k * 0.12)
-    return {item.name: Form(Rect(-w / 2, 0, w / 2, d + 0.04), h, regions=(region,), stance=stance)}

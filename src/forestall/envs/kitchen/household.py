@@ -226,8 +226,8 @@ class Household:
             what: what happened in words, e.g. "sliced".
         """
         new = [n for n in self._waiting if category_of(n) == category][:count]
-        parent, states = self._parents.pop(old), self._states[old]
         self.world.replace(old, new)
+        parent, states = self._parents.pop(old), self._states[old]
         self._gone[old] = what
         if self.held == old:
             self.held = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,7 +34,7 @@ def lathe(profile: Sequence[tuple[float, float]], segments: int = 22) -> Mesh:
         count += len(points)
     faces: list[Int] = []
     here, after = np.arange(segments), (np.arange(segments) + 1) % segments
-    for (a, na), (b, nb) in zip(starts, starts[1:], strict=False):
+    for (a, na), (b, nb) in itertools.pairwise(starts):
         if na > 1:
             faces.append(np.stack([a + here, a + after, b + (after if nb > 1 else 0 * here)], 1))
         if nb > 1:
@@ -158,9 +159,7 @@ def leaf(length: float, width: float, droop: float) -> Mesh:
     half = width / 2 * np.array([0.15, 1.0, 0.8, 0.02])
     z = length * (0.55 * t - droop * t**2)
     x = length * t * 0.85
-    top = np.concatenate(
-        [np.column_stack([x, half, z]), np.column_stack([x, -half, z + 0.002])]
-    )
+    top = np.concatenate([np.column_stack([x, half, z]), np.column_stack([x, -half, z + 0.002])])
     faces = []
     for k in range(3):
         faces += [[k, k + 4, k + 5], [k, k + 5, k + 1]]

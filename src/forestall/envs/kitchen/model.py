@@ -1,6 +1,6 @@
 """Builds a whole scene from what a task needs and a seed; the entry is `build_scene`.
 
-Draws the plan (`layout`), builds and compiles it (`rooms`, `objects`, `assembly`), furnishes it
+Draws the plan (`plans`), builds and compiles it (`rooms`, `objects`, `assembly`), furnishes it
 (`stocking`), and starts over with other random choices when something finds no place.
 """
 
@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from forestall.envs.kitchen import layout
+from forestall.envs.kitchen import layout, plans
 from forestall.envs.kitchen.assembly import Kit, compile_kit
 from forestall.envs.kitchen.bodies import Bodies
-from forestall.envs.kitchen.forms import Rect
+from forestall.envs.kitchen.forms import Instance, Rect
 from forestall.envs.kitchen.navigation import Floor, Standing
 from forestall.envs.kitchen.objects import build_thing
 from forestall.envs.kitchen.robot import build_robot
@@ -23,7 +23,7 @@ from forestall.envs.kitchen.rooms import build_room
 from forestall.envs.kitchen.settled import check_settled
 from forestall.envs.kitchen.stocking import OPEN_PLACES, Stocker
 from forestall.envs.kitchen.style import draw_style
-from forestall.envs.kitchen.world import HAND_M, Instance, KitchenWorld
+from forestall.envs.kitchen.world import HAND_M, KitchenWorld
 from forestall.errors import SceneError
 from forestall.types.facts import category_of, is_instance
 from forestall.types.scene import SceneNeeds
@@ -41,7 +41,9 @@ DRAFTS = 60
 _SPARE_CLUTTER = 3
 _NOT_CLUTTER = {
     "kitchen": frozenset({"Laptop", "RemoteControl"}),
-    "living-room": frozenset({"Pot", "Pan", "Kettle", "Knife", "Lettuce", "Egg", "Potato", "Bread"}),
+    "living-room": frozenset(
+        {"Pot", "Pan", "Kettle", "Knife", "Lettuce", "Egg", "Potato", "Bread"}
+    ),
 }
 
 
@@ -112,8 +114,10 @@ def _canonical(needs: SceneNeeds, vocabulary: Vocabulary) -> SceneNeeds:
             if vocabulary[place].receptacle is None:
                 raise SceneError(f"{need.id}: nothing can be put on or in a {place}")
         if need.in_front_of is not None and need.in_front_of not in ids:
-            raise SceneError(f"{need.id} is to stand in front of {need.in_front_of}, "
-                             "which is not among the needed objects")  # fmt: skip
+            raise SceneError(
+                f"{need.id} is to stand in front of {need.in_front_of}, "
+                "which is not among the needed objects"
+            )
     fixtures = tuple((vocabulary.canonical(f), a, v) for f, a, v in needs.fixtures)
     for name, attribute, value in fixtures:
         _checked(name, vocabulary[name].name, ((attribute, value),), vocabulary)
@@ -215,7 +219,7 @@ def _empty_room(
 
 
 def _drawn(room: str, rng: np.random.Generator) -> layout.Plan:
-    draw = layout.kitchen if room == "kitchen" else layout.living_room
+    draw = plans.kitchen if room == "kitchen" else plans.living_room
     for _ in range(DRAFTS):
         try:
             return draw(rng)
@@ -267,7 +271,5 @@ def _instances(empty: _Empty, things: Sequence[_Thing]) -> tuple[Instance, ...]:
         if parent is None and not (waiting and thing.made_from in bodies.parents):
             continue
         states = tuple(sorted(bodies.states[thing.name].items()))
-        found.append(
-            Instance(thing.name, thing.category, parent, states, waiting, thing.made_from)
-        )
+        found.append(Instance(thing.name, thing.category, parent, states, waiting, thing.made_from))
     return tuple(found)

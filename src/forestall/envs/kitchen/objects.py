@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from forestall.envs.kitchen import crockery, food, meshes
+from forestall.envs.kitchen import crockery, food, meshes, plants
 from forestall.envs.kitchen.assembly import Assembly, Kit
 from forestall.envs.kitchen.crockery import chosen, darker
 from forestall.envs.kitchen.forms import Form, Rect, Region, Rgba
@@ -66,9 +66,12 @@ def box(part: Assembly, category: str, shape: Mapping[str, Any], states: frozens
         part.box((0, 0, z / 2), size, chosen("", rng, (_DARK, (0.75, 0.75, 0.78, 1))))
         screens = {"off": (0.03, 0.03, 0.04, 1.0), "on": (0.45, 0.80, 1.0, 1.0)}
         part.box(
-            (0, 0, z), (x * 0.88, y * 0.88, 0.001), screens["off"], tints=("toggled", screens),
+            (0, 0, z),
+            (x * 0.88, y * 0.88, 0.001),
+            screens["off"],
+            tints=("toggled", screens),
             solid=False,
-        )  # fmt: skip
+        )
         lit = {"toggled": ("on",)}
         for k, tone in enumerate(((0.95, 0.45, 0.2), (0.3, 0.8, 0.35), (0.9, 0.85, 0.3))):
             at = ((k - 1) * x * 0.26, y * 0.12, z + 0.0006)
@@ -77,11 +80,12 @@ def box(part: Assembly, category: str, shape: Mapping[str, Any], states: frozens
     if category == "RemoteControl":
         part.box((0, 0, z * 0.45), (x, y, z * 0.9), chosen("", rng, (_DARK, (0.3, 0.3, 0.33, 1))))
         part.cylinder((0, y * 0.36, z * 0.93), x * 0.14, z * 0.12, (0.8, 0.1, 0.1, 1), solid=False)
+        key = meshes.extrude(_square(x * 0.09), 0, z * 0.1)
         keys = [
-            meshes.moved(meshes.extrude(_square(x * 0.09), 0, z * 0.1), i * x * 0.28, j * y * 0.1, z * 0.9)
+            meshes.moved(key, i * x * 0.28, j * y * 0.1, z * 0.9)
             for i in (-1, 0, 1)
             for j in (-3, -2, -1, 0, 1)
-        ]  # fmt: skip
+        ]
         part.mesh(meshes.merged(keys), (0.75, 0.75, 0.75, 1))
         return _plain(size)
     rgba = chosen(category, rng)
@@ -130,8 +134,11 @@ def knife(part: Assembly, category: str, shape: Mapping[str, Any], states: froze
     grip = chosen("", part.kit.rng, (_DARK, (0.42, 0.26, 0.14, 1), (0.55, 0.12, 0.10, 1)))
     hilt = -x / 2 + 0.40 * x
     blade = [
-        (hilt, -0.38 * y), (x / 2 - 0.15 * x, -0.40 * y), (x / 2, 0.30 * y), (hilt, 0.42 * y),
-    ]  # fmt: skip
+        (hilt, -0.38 * y),
+        (x / 2 - 0.15 * x, -0.40 * y),
+        (x / 2, 0.30 * y),
+        (hilt, 0.42 * y),
+    ]
     mid = z * 0.5
     part.mesh(
         meshes.extrude(blade, mid - 0.0015, mid + 0.0015), (0.82, 0.83, 0.85, 1), texture="metal"
@@ -167,8 +174,13 @@ def _laptop(part: Assembly, size: tuple[float, float, float]) -> Form:
     under = -lid / 2 + gap
     leaf.box((0, y / 2, under), (x * 0.94, y * 0.88, 0.0012), _DARK, solid=False)
     on = {"open": ("open",)}
-    leaf.box((0, y / 2, under - 0.0004), (x * 0.90, y * 0.82, 0.001), (0.35, 0.60, 0.86, 1),
-             solid=False, when=on)  # fmt: skip
+    leaf.box(
+        (0, y / 2, under - 0.0004),
+        (x * 0.90, y * 0.82, 0.001),
+        (0.35, 0.60, 0.86, 1),
+        solid=False,
+        when=on,
+    )
     for k, tone in enumerate(((0.92, 0.92, 0.95), (0.95, 0.75, 0.35))):
         at = ((k - 0.5) * x * 0.36, y / 2, under - 0.0012)
         leaf.box(at, (x * 0.3, y * 0.5, 0.001), (*tone, 1), solid=False, when=on)
@@ -179,8 +191,16 @@ def _laptop(part: Assembly, size: tuple[float, float, float]) -> Form:
 
 def _book(part: Assembly, size: tuple[float, float, float]) -> Form:
     x, y, z = size
-    cover = chosen("", part.kit.rng, ((0.55, 0.13, 0.13, 1), (0.13, 0.28, 0.48, 1),
-                                      (0.18, 0.38, 0.26, 1), (0.72, 0.52, 0.18, 1)))  # fmt: skip
+    cover = chosen(
+        "",
+        part.kit.rng,
+        (
+            (0.55, 0.13, 0.13, 1),
+            (0.13, 0.28, 0.48, 1),
+            (0.18, 0.38, 0.26, 1),
+            (0.72, 0.52, 0.18, 1),
+        ),
+    )
     page, half = (0.95, 0.93, 0.86, 1), z / 2
     ink = (0.35, 0.35, 0.38, 1)
 
@@ -212,7 +232,7 @@ _BUILDERS: Mapping[str, Builder] = {
     "vessel": crockery.vessel,
     "dish": crockery.dish,
     "bottle": crockery.bottle,
-    "plant": crockery.plant,
+    "plant": plants.plant,
     "slab": food.slab,
     "egg_cracked": food.egg_cracked,
     "knife": knife,

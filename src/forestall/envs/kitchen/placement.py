@@ -16,8 +16,8 @@ STEP_M = 0.02
 BLOCKING_HEIGHT_M = 0.04
 """What is lower than this is in nobody's way."""
 
-CORRIDOR_M = 0.04
-"""Free width to both sides of the way from a thing to the open edge."""
+_HIDING_M = 0.06
+"""How much higher a thing may lie in a hollow so as not to cover another one."""
 
 REST_M = 0.0004
 """How far above its support a thing is put, so that they do not touch."""
@@ -42,14 +42,23 @@ class Rules:
         gap_m: distance from others.
         spare: nothing may come to stand before these (None: before anything).
         clear: whether nothing may stand before the new thing.
+        corridor_m: free width to both sides of the way from a thing to the open edge.
     """
 
     gap_m: float = 0.03
     spare: frozenset[str] | None = None
     clear: bool = True
+    corridor_m: float = 0.04
 
 
-LEVELS = (Rules(), Rules(gap_m=0.015, spare=frozenset()), Rules(0.008, frozenset(), clear=False))
+_NOTHING: frozenset[str] = frozenset()
+LEVELS = (
+    Rules(),
+    Rules(gap_m=0.012, corridor_m=0.005),
+    Rules(gap_m=0.012, corridor_m=0.005, clear=False),
+    Rules(gap_m=0.012, corridor_m=0.005, spare=_NOTHING),
+    Rules(gap_m=0.008, corridor_m=0.0, spare=_NOTHING, clear=False),
+)
 """From the spots that a careful robot prefers to any spot at all."""
 
 Score = Callable[[Float], Float]
@@ -120,9 +129,9 @@ def _on_surface(
             continue
         if tall and (rules.spare is None or other.name in rules.spare):
             way = Rect(other.rect.x0, other.rect.y1, other.rect.x1, region.front_m)
-            free &= ~_meets(at, rect, way.grown(CORRIDOR_M, 0))
+            free &= ~_meets(at, rect, way.grown(rules.corridor_m, 0))
         if rules.clear and other.height_m >= BLOCKING_HEIGHT_M:
-            beside = other.rect.grown(CORRIDOR_M, 0)
+            beside = other.rect.grown(rules.corridor_m, 0)
             behind = Rect(beside.x0, region.area.y0 - 1, beside.x1, beside.y0)
             free &= ~_meets(at, rect, behind)
     if not free.any():
@@ -180,19 +189,26 @@ def _in_pile(region: Region, form: Form, occupants: Sequence[Occupant]) -> Pose 
         for a in angles
         if s > 0.004
     ]
-    best: tuple[float, int, float, float] | None = None
-    for k, (x, y) in enumerate(offsets):
+    best: tuple[float, float, float, float] | None = None
+    for x, y in offsets:
         need = float(np.hypot(x, y)) + r
         z = float(np.interp(need, widening, heights, left=0.0, right=np.inf))
+        hidden = 0.0
         for other in sorted(occupants, key=lambda o: o.z_m):
             cx, cy = other.rect.centre
-            near = float(np.hypot(cx - x, cy - y)) < r + other.core_m
-            if near and z < other.z_m + other.height_m + 2 * REST_M and z + form.height_m > other.z_m:
-                z = other.z_m + other.height_m + 2 * REST_M
+            over = r + other.core_m - float(np.hypot(cx - x, cy - y))
+            if over <= 0:
+                continue
+            hidden += min(over / (2 * min(r, other.core_m)), 1.0)
+            top = other.z_m + other.height_m + 2 * REST_M
+            if z < top and z + form.height_m > other.z_m:
+                z = top
+        cost = z + _HIDING_M * hidden
         if z <= region.clearance_m - 0.25 * form.height_m and (
-            best is None or z < best[0] - 1e-4
+            best is None or cost < best[0] - 1e-4
         ):
-            best = (z, k, x, y)
+            best = (cost, z, x, y)
     if best is None:
         return None
-    return pose_at(best[2], best[3], region.z_m + REST_M + best[0])
+    _, z, x, y = best
+    return pose_at(x, y, region.z_m + REST_M + z)

@@ -35,7 +35,7 @@ def build_robot(kit: Kit, hand: Vec) -> None:
     part.ellipsoid(shoulder, (0.06, 0.06, 0.06), _JOINT, **look)
     part.capsule(shoulder, elbow, 0.042, _SHELL, **look)
     part.ellipsoid(elbow, (0.05, 0.05, 0.05), _JOINT, **look)
-    part.capsule(elbow, wrist, 0.034, _SLEEVE, **look)
+    part.capsule(elbow, wrist, 0.027, _SLEEVE, **look)
     part.cylinder(wrist, 0.036, 0.05, _JOINT, **look)
     part.box((x - 0.105, y, z + 0.045), (0.05, 0.10, 0.035), _JOINT, **look)
     for side in (-1, 1):

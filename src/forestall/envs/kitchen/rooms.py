@@ -21,7 +21,7 @@ _BUILDERS: Mapping[str, Callable[[Kit, Item, Style], Forms]] = {
     "counter": furniture.counter,
     "corner": furniture.corner,
     "stove": furniture.stove,
-    "cabinet": furniture.cabinet,
+    "cabinet": tables.cabinet,
     "fridge": appliances.fridge,
     "microwave": appliances.microwave,
     "coffee_machine": appliances.coffee_machine,
@@ -57,9 +57,13 @@ def _shell(kit: Kit, plan: Plan, style: Style) -> None:
     floor.box((0, 0, -t / 2), (w + 2 * t, d + 2 * t, t), style.floor, texture=style.floor_texture)
     shell = kit.furniture(None, "walls", (0, 0, 0, 0))
     for side in (-1, 1):
-        shell.box((side * (w / 2 + t / 2), 0, h / 2), (t, d + 2 * t, h), style.wall, texture="plaster")
+        shell.box(
+            (side * (w / 2 + t / 2), 0, h / 2), (t, d + 2 * t, h), style.wall, texture="plaster"
+        )
         shell.box((0, side * (d / 2 + t / 2), h / 2), (w, t, h), style.wall, texture="plaster")
-    shell.box((0, 0, h + t / 2), (w + 2 * t, d + 2 * t, t), (0.93, 0.93, 0.92, 1), texture="plaster")
+    shell.box(
+        (0, 0, h + t / 2), (w + 2 * t, d + 2 * t, t), (0.93, 0.93, 0.92, 1), texture="plaster"
+    )
     skirt = darker(style.wall, 1.12)
     for side in (-1, 1):
         shell.box((side * (w / 2 - 0.004), 0, 0.04), (0.008, d, 0.08), skirt, solid=False)
@@ -101,8 +105,13 @@ def _hang(
     if kind == "rug":
         rug = kit.furniture(None, name, (c * u + s * (out - z), s * u - c * (out - z), 0, yaw))
         rug.box((0, 0, 0.0006), (w, h, 0.0012), style.rug, texture="fabric", solid=False)
-        rug.box((0, 0, 0.0009), (w - 0.16, h - 0.16, 0.0012), darker(style.rug, 1.2),
-                texture="fabric", solid=False)  # fmt: skip
+        rug.box(
+            (0, 0, 0.0009),
+            (w - 0.16, h - 0.16, 0.0012),
+            darker(style.rug, 1.2),
+            texture="fabric",
+            solid=False,
+        )
         return
     part = kit.furniture(None, name, (c * u + s * out, s * u - c * out, z, yaw))
     _DECOR[kind](part, style, w, h)
@@ -137,10 +146,21 @@ def _door(part: Assembly, style: Style, w: float, h: float) -> None:
     part.box((0, 0.010, h / 2), (w + 0.14, 0.020, h + 0.07), (0.94, 0.93, 0.91, 1), solid=False)
     part.box((0, 0.018, h / 2 - 0.01), (w, 0.018, h - 0.03), leaf, texture=texture, solid=False)
     for z in (0.30, 0.72):
-        part.box((0, 0.028, h * z), (w - 0.26, 0.004, h * 0.34), darker(leaf, 0.93),
-                 texture=texture, solid=False)  # fmt: skip
-    part.capsule((w / 2 - 0.16, 0.07, 1.02), (w / 2 - 0.06, 0.07, 1.02), 0.009, STEEL,
-                 texture="metal", solid=False)  # fmt: skip
+        part.box(
+            (0, 0.028, h * z),
+            (w - 0.26, 0.004, h * 0.34),
+            darker(leaf, 0.93),
+            texture=texture,
+            solid=False,
+        )
+    part.capsule(
+        (w / 2 - 0.16, 0.07, 1.02),
+        (w / 2 - 0.06, 0.07, 1.02),
+        0.009,
+        STEEL,
+        texture="metal",
+        solid=False,
+    )
     part.capsule((w / 2 - 0.06, 0.02, 1.02), (w / 2 - 0.06, 0.07, 1.02), 0.009, STEEL, solid=False)
 
 

@@ -22,7 +22,7 @@ from forestall.envs.kitchen.naming import (
     resolve_thing,
     why_no_room,
 )
-from forestall.errors import ForestallError
+from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
 
@@ -91,12 +91,12 @@ class Robot:
 
 
 def perform(robot: Robot, subtask: Subtask) -> SkillOutcome:
-    """Run one skill on the household; never raises on names that mean nothing here."""
+    """Run one skill on the household; what cannot be done is refused and never raised."""
     start_s = robot.household.time_s
     try:
         reason = SKILL_TABLE[subtask.skill](robot, *subtask.args)
         status = SkillStatus.SUCCEEDED
-    except RefusalError as refusal:
+    except (RefusalError, SceneError) as refusal:
         reason, status = str(refusal), SkillStatus.REFUSED
     return SkillOutcome(status, robot.household.time_s - start_s, reason)
 
@@ -262,18 +262,19 @@ def crack_obj(robot: Robot, what: str) -> str:
     category = home.category(name)
     if category.cracks_into is None:
         raise RefusalError(f"{name} cannot be cracked")
-    if name != home.held:
+    if name == home.held:
+        place = _under_the_hand(robot, name, category.cracks_into)
+        if place is None:
+            raise RefusalError(f"there is no room for what is in {name}")
+        home.put(name, place)
+    else:
         robot.need_accessible(name)
         robot.approach(name)
-        place = home.parent(name)
-    else:
-        place = _under_the_hand(robot, category.cracks_into)
     _refocus(robot, name)
     for cracked in home.replace(name, category.cracks_into, 1, "cracked"):
-        if place is not None and home.parent(cracked) != place:
-            home.put(cracked, place)
-        if place is not None:
-            effects.arrived(home, cracked, place)
+        parent = home.parent(cracked)
+        if parent is not None:
+            effects.arrived(home, cracked, parent)
     return robot.done(robot.times.crack_s)
 
 
@@ -282,32 +283,28 @@ def _refocus(robot: Robot, vanishing: str) -> None:
         robot.focus = robot.household.parent(vanishing)
 
 
-def _under_the_hand(robot: Robot, category: str) -> str | None:
+def _under_the_hand(robot: Robot, held: str, becomes: str) -> str | None:
     """Where something let go of lands.
 
     In the vessel that stands on what the robot faces (on a burner, say), in what it faces, on the
-    support of that, else on the floor.
+    support of that, else on the floor; wherever there is room.
     """
     home = robot.household
     focus = robot.focus
-    if focus is None or not home.exists(focus) or not home.world.within_reach(focus):
-        return home.first(FLOOR)
-    kind = home.category(focus).receptacle
-    on_it = home.contents(focus) if kind is not None and kind.capacity is not None else []
-    for place in [*on_it, focus, *home.ancestors(focus)]:
+    candidates: list[str] = []
+    if focus is not None and home.exists(focus) and home.world.within_reach(focus):
+        kind = home.category(focus).receptacle
+        on_it = home.contents(focus) if kind is not None and kind.capacity is not None else []
+        candidates = [*on_it, focus, *home.ancestors(focus)]
+    for place in [*candidates, *home.of_category(FLOOR)]:
         if (
-            home.vocabulary.accepts(place, category)
+            home.vocabulary.accepts(place, becomes)
             and home.closed_around(place) is None
             and not home.is_shut(place)
-            and _has_space(home, place)
+            and why_no_room(home, held, place) is None
         ):
             return place
-    return home.first(FLOOR)
-
-
-def _has_space(home: Household, place: str) -> bool:
-    kind = home.category(place).receptacle
-    return kind is not None and (kind.capacity is None or len(home.contents(place)) < kind.capacity)
+    return None
 
 
 def pour(robot: Robot, what: str, target: str) -> str:

@@ -85,9 +85,7 @@ class Stocker:
             if found is not None and (blocker is None or found[0].front_m is not None):
                 self.world.settle(need.id, *found)
                 return
-        raise SceneError(
-            f"no free place for {need.id} on or in {', '.join(options) or 'anything'}"
-        )
+        raise SceneError(f"no free place for {need.id} on or in {', '.join(options) or 'anything'}")
 
     def _receptacles(self, need: ObjectNeed) -> list[str]:
         """Allowed receptacles in random order.
@@ -99,14 +97,16 @@ class Stocker:
         there = [*self.fixtures, *self._needed]
         options = [n for n in there if n in wanted or category_of(n) in wanted]
         if not options:
-            raise SceneError(f"{need.id} needs {' or '.join(wanted)}, which the scene does not have")
+            raise SceneError(
+                f"{need.id} needs {' or '.join(wanted)}, which the scene does not have"
+            )
         taking = [n for n in options if self.vocabulary.accepts(n, need.category)]
         if not taking:
             raise SceneError(f"{need.id}: {' or '.join(wanted)} does not take a {need.category}")
         return [taking[int(i)] for i in self.rng.permutation(len(taking))]
 
     def _turns(self, size: tuple[float, float]) -> tuple[float, ...]:
-        """Random turns: slight for long things, larger for round ones; straight as a last resort."""
+        """A random turn, slight for long things, and straight as a last resort."""
         long = max(size) / min(size) > _LONG
         turn = float(self.rng.normal(0, np.deg2rad(4 if long else 11)))
         return (float(np.clip(turn, -0.4, 0.4)), 0.0)
@@ -153,7 +153,9 @@ class Stocker:
         for yaw in turns:
             rect = form.footprint.turned(yaw)
             gap = float(self.rng.uniform(0.022, 0.05))
-            x = target.centre[0] - rect.centre[0]
+            spare = max(target.size[0] - rect.size[0], 0.0)
+            aside = 0.3 * spare * float(self.rng.choice([-1, 1]))
+            x = target.centre[0] + aside - rect.centre[0]
             y = target.y1 + gap - rect.y0
             here = rect.moved(x, y)
             others = bodies.occupants(region, index)
@@ -240,9 +242,7 @@ def _in_order(needs: Sequence[ObjectNeed], vocabulary: Vocabulary) -> list[Objec
 
 def _depends(need: ObjectNeed, needs: Sequence[ObjectNeed], vocabulary: Vocabulary) -> set[str]:
     wanted = {vocabulary.canonical(p) for p in need.places}
-    found = {
-        n.id for n in needs if n.id != need.id and (n.id in wanted or n.category in wanted)
-    }
+    found = {n.id for n in needs if n.id != need.id and (n.id in wanted or n.category in wanted)}
     if need.in_front_of is not None and any(n.id == need.in_front_of for n in needs):
         found.add(need.in_front_of)
     return found

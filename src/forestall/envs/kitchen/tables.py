@@ -1,4 +1,4 @@
-"""Builds tables, shelves, bins and seats; frames as in `furniture`."""
+"""Builds tables, shelves, wall cabinets, bins and seats; frames as in `furniture`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,56 @@ from forestall.envs.kitchen.assembly import Assembly, Kit
 from forestall.envs.kitchen.crockery import darker
 from forestall.envs.kitchen.forms import Form, Rect, Region, Stance
 from forestall.envs.kitchen.furniture import Forms
-from forestall.envs.kitchen.layout import Item
+from forestall.envs.kitchen.layout import COUNTER_DEPTH_M, Item
 from forestall.envs.kitchen.style import DARK, STEEL, Style
+
+
+def cabinet(kit: Kit, item: Item, style: Style) -> Forms:
+    """A wall cabinet above a counter, hinged at the side `item.hinge`."""
+    z0, w, d, h, t = item.z, item.width, 0.33, 0.60, 0.018
+    part = kit.furniture(item.name, item.name, (item.x, item.y, z0, item.yaw))
+    inside = darker(style.front, 1.05)
+    for side in (-1, 1):
+        part.box(
+            (side * (w / 2 - t / 2), d / 2, h / 2),
+            (t, d, h),
+            style.front,
+            texture=style.front_texture,
+        )
+    for z in (t / 2, h - t / 2):
+        part.box((0, d / 2, z), (w - 2 * t, d, t), style.front, texture=style.front_texture)
+    part.box((0, 0.005, h / 2), (w - 2 * t, 0.01, h - 2 * t), inside)
+    k = item.hinge
+    angle = -k * float(np.deg2rad(105))
+    door = part.swinging(
+        "door", (k * w / 2, d + 0.001, 0), (0, 0, 1), "open", {"closed": 0.0, "open": angle}
+    )
+    door.box(
+        (-k * w / 2, 0.010, h / 2),
+        (w - 0.006, 0.018, h - 0.006),
+        style.front,
+        texture=style.front_texture,
+    )
+    door.box(
+        (-k * w / 2, 0.020, h / 2),
+        (w - 0.12, 0.004, h - 0.12),
+        darker(style.front, 0.90),
+        texture=style.front_texture,
+        solid=False,
+    )
+    door.box(
+        (-k * (w - 0.05), 0.034, 0.12),
+        (0.012, 0.010, 0.14),
+        style.handle,
+        texture="metal",
+        solid=False,
+    )
+    for z in (0.06, 0.18):
+        door.box((-k * (w - 0.05), 0.026, z), (0.01, 0.02, 0.01), style.handle, solid=False)
+    area = Rect(-w / 2 + t + 0.006, 0.03, w / 2 - t - 0.006, d - 0.02)
+    region = Region(item.name, item.name, area, t, h - 2 * t - 0.01, front_m=d)
+    stance = Stance(COUNTER_DEPTH_M, distance_m=0.62, aside_m=-k * 0.12)
+    return {item.name: Form(Rect(-w / 2, 0, w / 2, d + 0.04), h, regions=(region,), stance=stance)}
 
 
 def table(kit: Kit, item: Item, style: Style) -> Forms:
@@ -18,12 +66,17 @@ def table(kit: Kit, item: Item, style: Style) -> Forms:
     part = kit.furniture(item.name, item.name, (item.x, item.y, 0, item.yaw))
     w, d, top = item.width, item.depth, 0.75
     part.box((0, d / 2, top - 0.018), (w, d, 0.036), style.table, texture="wood")
-    part.box((0, d / 2, top - 0.066), (w - 0.14, d - 0.14, 0.06), darker(style.table, 0.85),
-             texture="wood")  # fmt: skip
+    part.box(
+        (0, d / 2, top - 0.066),
+        (w - 0.14, d - 0.14, 0.06),
+        darker(style.table, 0.85),
+        texture="wood",
+    )
     for x in (-w / 2 + 0.06, w / 2 - 0.06):
         for y in (0.06, d - 0.06):
-            part.box((x, y, (top - 0.036) / 2), (0.06, 0.06, top - 0.036), style.table,
-                     texture="wood")  # fmt: skip
+            part.box(
+                (x, y, (top - 0.036) / 2), (0.06, 0.06, top - 0.036), style.table, texture="wood"
+            )
     area = Rect(-w / 2 + 0.03, max(0.03, d - 0.62), w / 2 - 0.03, d - 0.03)
     region = Region(item.name, item.name, area, top, front_m=d)
     return {item.name: Form(Rect(-w / 2, 0, w / 2, d), top, regions=(region,), stance=Stance(d))}
@@ -54,8 +107,13 @@ def _row_of_books(part: Assembly, w: float, d: float, z: float) -> None:
     for _ in range(int(rng.integers(4, 8))):
         thick, tall = float(rng.uniform(0.02, 0.045)), float(rng.uniform(0.18, 0.25))
         tone = tones[int(rng.integers(len(tones)))]
-        part.box((x + thick / 2, d * 0.45, z + tall / 2), (thick, 0.15, tall), (*tone, 1),
-                 texture="fabric", solid=False)  # fmt: skip
+        part.box(
+            (x + thick / 2, d * 0.45, z + tall / 2),
+            (thick, 0.15, tall),
+            (*tone, 1),
+            texture="fabric",
+            solid=False,
+        )
         x += thick + 0.002
 
 
@@ -70,7 +128,9 @@ def garbage_can(kit: Kit, item: Item, style: Style) -> Forms:
         y = d / 2 + side * (d / 2 - t / 2)
         part.box((0, y, h / 2), (w - 2 * t, t, h), rgba, texture="metal")
         part.box((side * (w / 2 - 0.004), d / 2, h), (0.024, d + 0.016, 0.02), DARK, solid=False)
-        part.box((0, d / 2 + side * (d / 2 - 0.004), h), (w + 0.016, 0.024, 0.02), DARK, solid=False)
+        part.box(
+            (0, d / 2 + side * (d / 2 - 0.004), h), (w + 0.016, 0.024, 0.02), DARK, solid=False
+        )
     area = Rect(-w / 2 + 0.014, 0.014, w / 2 - 0.014, d - 0.014)
     region = Region(item.name, item.name, area, 0.0105, first_m=d / 2)
     stance = Stance(d, distance_m=0.5)
@@ -101,11 +161,21 @@ def sofa(kit: Kit, item: Item, style: Style) -> Forms:
     for side in (-1, 1):
         part.box((side * (w / 2 - 0.09), d / 2, 0.42), (0.18, d, 0.34), cloth, texture="fabric")
         seat = (w - 0.38) / 2
-        part.box((side * seat / 2, d / 2 + 0.09, 0.32), (seat - 0.01, d - 0.20, 0.16), cloth,
-                 texture="fabric")  # fmt: skip
+        part.box(
+            (side * seat / 2, d / 2 + 0.09, 0.32),
+            (seat - 0.01, d - 0.20, 0.16),
+            cloth,
+            texture="fabric",
+        )
     pillow = style.rug
-    part.box((w * 0.28, 0.28, 0.52), (0.38, 0.12, 0.30), pillow, texture="fabric",
-             quat=(float(np.cos(0.12)), float(-np.sin(0.12)), 0, 0), solid=False)  # fmt: skip
+    part.box(
+        (w * 0.28, 0.28, 0.52),
+        (0.38, 0.12, 0.30),
+        pillow,
+        texture="fabric",
+        quat=(float(np.cos(0.12)), float(-np.sin(0.12)), 0, 0),
+        solid=False,
+    )
     return {}
 
 
@@ -120,8 +190,13 @@ def tv_stand(kit: Kit, item: Item, style: Style) -> Forms:
     for x in (-w / 2 + 0.015, -w / 6, w / 6, w / 2 - 0.015):
         part.box((x, d / 2, top / 2 + 0.02), (0.025, d, top - 0.11), wood, texture="wood")
     for x in (-w / 3, w / 3):
-        part.box((x, d - 0.012, top / 2 + 0.02), (w / 3 - 0.04, 0.018, top - 0.13),
-                 darker(wood, 1.12), texture="wood", solid=False)  # fmt: skip
+        part.box(
+            (x, d - 0.012, top / 2 + 0.02),
+            (w / 3 - 0.04, 0.018, top - 0.13),
+            darker(wood, 1.12),
+            texture="wood",
+            solid=False,
+        )
         part.box((x, d + 0.004, top / 2 + 0.02), (0.10, 0.014, 0.012), style.handle, solid=False)
     area = Rect(-w / 2 + 0.03, 0.13, w / 2 - 0.03, d - 0.02)
     region = Region(item.name, item.name, area, top, front_m=d)
@@ -139,8 +214,14 @@ def _television(kit: Kit, item: Item, name: str, top: float, depth: float) -> Fo
     face, tall, wide = 0.0935, h - 0.05, w - 0.04
     screens = {"off": (0.025, 0.028, 0.033, 1.0), "on": (0.42, 0.72, 1.0, 1.0)}
     middle = foot + h / 2
-    part.box((0, face, middle), (wide, 0.003, tall), screens["off"], texture="ceramic",
-             tints=("toggled", screens), solid=False)  # fmt: skip
+    part.box(
+        (0, face, middle),
+        (wide, 0.003, tall),
+        screens["off"],
+        texture="ceramic",
+        tints=("toggled", screens),
+        solid=False,
+    )
     on = {"toggled": ("on",)}
     low = middle - tall / 2
     scene = (
@@ -152,8 +233,13 @@ def _television(kit: Kit, item: Item, name: str, top: float, depth: float) -> Fo
     for k, ((x, z), (sx, sz), rgba) in enumerate(scene):
         part.box((x, face + 0.0008 * (k + 1), z), (sx, 0.003, sz), rgba, when=on, solid=False)
     lamps = {"off": (0.6, 0.05, 0.05, 1.0), "on": (0.1, 0.95, 0.2, 1.0)}
-    part.box((wide * 0.46, 0.0935, foot + 0.012), (0.015, 0.004, 0.006), lamps["off"],
-             tints=("toggled", lamps), solid=False)  # fmt: skip
+    part.box(
+        (wide * 0.46, 0.0935, foot + 0.012),
+        (0.015, 0.004, 0.006),
+        lamps["off"],
+        tints=("toggled", lamps),
+        solid=False,
+    )
     stance = Stance(depth, distance_m=0.85)
     return Form(Rect(-w / 2, 0.02, w / 2, 0.12), foot + h, stance=stance)
 
@@ -167,10 +253,16 @@ def floor_lamp(kit: Kit, item: Item, style: Style) -> Forms:
     part.cylinder((0, y, 0.68), 0.012, 1.32, style.handle, texture="metal")
     shades = {"off": (0.62, 0.56, 0.46, 1.0), "on": (1.0, 0.95, 0.72, 1.0)}
     line = [(0.17, 1.22), (0.11, 1.50), (0.107, 1.50), (0.167, 1.22), (0.17, 1.22)]
-    part.mesh(meshes.lathe(line, 24), shades["off"], at=(0, y, 0), texture="fabric",
-              tints=("toggled", shades))  # fmt: skip
+    part.mesh(
+        meshes.lathe(line, 24),
+        shades["off"],
+        at=(0, y, 0),
+        texture="fabric",
+        tints=("toggled", shades),
+    )
     bulbs = {"off": (0.75, 0.75, 0.72, 1.0), "on": (1.0, 1.0, 0.92, 1.0)}
-    part.ellipsoid((0, y, 1.36), (0.04, 0.04, 0.055), bulbs["off"], tints=("toggled", bulbs),
-                   solid=False)  # fmt: skip
+    part.ellipsoid(
+        (0, y, 1.36), (0.04, 0.04, 0.055), bulbs["off"], tints=("toggled", bulbs), solid=False
+    )
     stance = Stance(d, distance_m=0.7)
     return {item.name: Form(Rect(-d / 2, 0, d / 2, d), 1.5, stance=stance)}

@@ -1,23 +1,23 @@
 """The household's geometry as the skills see it: `KitchenWorld` implements `World`.
 
-Skills and the environment call it; it calls `bodies` (poses and looks), `placement` (free spots)
+Skills and the environment call it; it calls `bodies` (poses and looks), `spots` (free spots)
 and `navigation` (standing places). It knows places and looks, no rules of the household.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from forestall.envs.kitchen import navigation
+from forestall.envs.kitchen import navigation, spots
 from forestall.envs.kitchen.bodies import Bodies, Snapshot
 from forestall.envs.kitchen.forms import (
     FLOOR,
     Float,
     Form,
+    Instance,
     Pose,
     Rect,
     Region,
@@ -34,9 +34,9 @@ from forestall.envs.kitchen.placement import (
     Rules,
     Score,
     footprint_at,
-    spot,
 )
 from forestall.envs.kitchen.rendering.appearance import Appearance
+from forestall.envs.kitchen.spots import YAWS, Found
 from forestall.errors import SceneError
 from forestall.types.observation import Vec3
 
@@ -46,28 +46,6 @@ HAND_M = (0.45, -0.21, EYE_HEIGHT_M - 0.45)
 """Where the hand is: forward and left (here: right) of the robot's axis, and above the floor."""
 
 BLOCKING_WAY_M = 0.25
-_YAWS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
-
-
-@dataclass(frozen=True, slots=True)
-class Instance:
-    """One thing or fixture of a scene as it starts.
-
-    Args:
-        name: instance name.
-        category: its category.
-        parent: receptacle that it starts on or in; FLOOR for the floor; None for fixtures.
-        states: (attribute, value) pairs.
-        prepared: not there yet; waits to replace something.
-        made_from: of a prepared thing: what it replaces.
-    """
-
-    name: str
-    category: str
-    parent: str | None
-    states: tuple[tuple[str, str], ...]
-    prepared: bool = False
-    made_from: str | None = None
 
 
 class KitchenWorld:
@@ -150,7 +128,7 @@ class KitchenWorld:
 
     def drive_to(self, name: str) -> float:
         """Drive to where `name` can be reached and face it; returns the simulated seconds."""
-        if name == FLOOR or name == self.held_name:
+        if name in (FLOOR, self.held_name):
             return 0.0
         goal = self.standing_for(name)
         if goal is None:
@@ -232,7 +210,7 @@ class KitchenWorld:
         return target, navigation.before(frame, stance, x)
 
     def _middle(self, form: Form) -> float:
-        """x of the middle of the widest stretch on which things can be put."""
+        """X of the middle of the widest stretch on which things can be put."""
         if not form.regions or form.regions[0].kind != "surface":
             return form.footprint.centre[0]
         region = form.regions[0]
@@ -320,57 +298,29 @@ class KitchenWorld:
         receptacle: str,
         *,
         levels: Sequence[Rules] = LEVELS,
-        near: Sequence[float] | None = None,
-        yaws: Sequence[float] = _YAWS,
+        near: Float | None = None,
+        yaws: Sequence[float] = YAWS,
         score: Score | None = None,
-    ) -> tuple[Region, int, Pose] | None:
-        """The best free spot: region, its index and the pose in its carrier's frame.
-
-        Args:
-            thing: what is to be put.
-            receptacle: where.
-            levels: what the spot must respect, the strictest first.
-            near: world point to which it should be near (default: before the robot).
-            yaws: turns of the thing that may be used, the best first.
-            score: overrides the choice among free spots.
-        """
+    ) -> Found | None:
+        """The best free spot; the arguments are those of `spots.find`."""
         if receptacle == FLOOR:
-            return self._floor_spot(thing, near)
-        form = self.bodies.forms[thing]
-        regions = self.bodies.forms[receptacle].regions if receptacle in self.bodies.forms else ()
-        for rules in levels:
-            for index, region in enumerate(regions):
-                taken = self.bodies.occupants(region, index, without=thing)
-                judge = score or self._nearness(region, near, form)
-                found = spot(region, form, taken, rules, judge, yaws)
-                if found is not None:
-                    return region, index, found
-        return None
-
-    def _nearness(self, region: Region, near: Sequence[float] | None, form: Form) -> Score:
-        """Cost of places: near the open edge, and before the robot (or near a point)."""
-        to_local = inverse(self.bodies.pose(region.carrier))
-        point = (self._robot.x, self._robot.y, 0.0) if near is None else tuple(near)
-        at = to_local @ np.array([point[0], point[1], point[2] if len(point) > 2 else 0, 1.0])
-        half = form.footprint.size[1] / 2
-        first = region.area.y1 - 0.05 - half if region.first_m is None else region.first_m
-        x = float(np.clip(at[0], region.area.x0, region.area.x1))
-        if region.first_m is not None:
-            x = region.area.centre[0]
-
-        def cost(places: Float) -> Float:
-            if near is not None:
-                return np.asarray(np.hypot(places[:, 0] - at[0], places[:, 1] - at[1]))
-            return np.asarray(np.abs(places[:, 0] - x) + 2.0 * np.abs(places[:, 1] - first))
-
-        return cost
+            return spots.on_floor(
+                self.bodies, self._free_floor(without=thing), self._robot, thing, near
+            )
+        here = np.array(self.robot_position_world_m)
+        return spots.find(
+            self.bodies,
+            thing,
+            receptacle,
+            here=here,
+            levels=levels,
+            near=near,
+            yaws=yaws,
+            score=score,
+        )
 
     def place(self, thing: str, receptacle: str) -> None:
-        """Put `thing` at a free spot on or in `receptacle`, resting on it, and attach it.
-
-        Raises:
-            SceneError: there is no room.
-        """
+        """Put `thing` at a free spot on or in `receptacle`, or raise SceneError."""
         found = self.find_spot(thing, receptacle)
         if found is None:
             raise SceneError(f"{receptacle} has no room for {thing}")
@@ -400,42 +350,10 @@ class KitchenWorld:
 
     def drop(self, thing: str) -> None:
         """Let `thing` (with what is attached to it) fall from the gripper to the floor nearby."""
-        found = self._floor_spot(thing, None)
+        found = self.find_spot(thing, FLOOR)
         if found is None:
             raise SceneError(f"there is no free floor near the robot for {thing}")
         self.settle(thing, *found)
-
-    def _floor_spot(
-        self, thing: str, near: Sequence[float] | None
-    ) -> tuple[Region, int, Pose] | None:
-        form = self.bodies.forms[thing]
-        region = self.bodies.forms[FLOOR].regions[0]
-        floor = self._free_floor(without=thing)
-        yaw = self._robot.yaw_rad + np.pi / 2
-        rect = form.footprint.turned(yaw)
-        sides = np.deg2rad([-50, 50, -30, 30, -75, 75, 0, -100, 100, -125, 125])
-        options = [(float(a), r) for r in (0.45, 0.52, 0.60, 0.38, 0.70, 0.85) for a in sides]
-        places = []
-        for angle, radius in options:
-            at = self._robot.local_to_world(radius * np.cos(angle), radius * np.sin(angle), 0)
-            places.append((float(at[0]), float(at[1])))
-        if near is not None:
-            nx, ny = float(near[0]), float(near[1])
-            ring = [(0.0, 0.0)] + [
-                (r * float(np.cos(a)), r * float(np.sin(a)))
-                for r in (0.06, 0.10, 0.15, 0.2, 0.3)
-                for a in 2 * np.pi * np.arange(12) / 12
-            ]
-            places = [(nx + x, ny + y) for x, y in ring]
-        for x, y in places:
-            here = rect.moved(x, y).grown(0.02)
-            a = floor.area
-            inside = a.x0 < here.x0 and a.y0 < here.y0 and here.x1 < a.x1 and here.y1 < a.y1
-            body = Rect(*here.centre, *here.centre).grown(here.size[0] / 2, here.size[1] / 2)
-            touches = body.distance(self._robot.x, self._robot.y) < 0.17
-            if inside and not touches and not any(here.overlaps(o) for o in floor.obstacles):
-                return region, 0, pose_at(x, y, region.z_m + REST_M, yaw)
-        return None
 
     # looks and replacement
 
@@ -471,7 +389,7 @@ class KitchenWorld:
         if first:
             self.hold(name)
             return
-        found = self._floor_spot(name, pose[:2, 3])
+        found = self.find_spot(name, FLOOR, near=pose[:3, 3])
         if found is not None:
             self.settle(name, *found)
 
