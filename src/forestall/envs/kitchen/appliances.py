@@ -120,24 +120,7 @@ def microwave(kit: Kit, item: Item, style: Style) -> Forms:
     part.cylinder(
         (middle, d / 2 + 0.01, t + 0.004), 0.13, 0.004, (0.72, 0.80, 0.82, 1), texture="ceramic"
     )
-    front = d + 0.0225
-    panel = (split - w / 2) / 2
-    part.box((panel, front, h / 2), (0.105, 0.003, h - 0.05), DARK, solid=False)
-    screens = {"off": (0.05, 0.14, 0.10, 1.0), "on": (0.25, 1.0, 0.55, 1.0)}
-    part.box(
-        (panel, front + 0.001, h - 0.065),
-        (0.085, 0.004, 0.035),
-        screens["off"],
-        tints=("toggled", screens),
-        solid=False,
-    )
-    for row in range(4):
-        part.box(
-            (panel, front + 0.001, 0.06 + 0.035 * row),
-            (0.08, 0.004, 0.02),
-            (0.45, 0.46, 0.48, 1),
-            solid=False,
-        )
+    _panel(part, (split - w / 2) / 2, d + 0.0225, h)
     lamps = {"off": (0.6, 0.6, 0.55, 1.0), "on": (1.0, 0.93, 0.55, 1.0)}
     part.box(
         (middle, 0.021, h / 2),
@@ -177,6 +160,26 @@ def microwave(kit: Kit, item: Item, style: Style) -> Forms:
     stance = Stance(COUNTER_DEPTH_M - item.inset, distance_m=0.70, aside_m=-0.10)
     box = Rect(-w / 2, 0, w / 2, d + 0.045)
     return {item.name: Form(box, h, regions=(region,), stance=stance)}
+
+
+def _panel(part: Assembly, x: float, front: float, h: float) -> None:
+    """Keys and a display that is lit while the microwave runs."""
+    part.box((x, front, h / 2), (0.105, 0.003, h - 0.05), DARK, solid=False)
+    screens = {"off": (0.05, 0.14, 0.10, 1.0), "on": (0.25, 1.0, 0.55, 1.0)}
+    part.box(
+        (x, front + 0.001, h - 0.065),
+        (0.085, 0.004, 0.035),
+        screens["off"],
+        tints=("toggled", screens),
+        solid=False,
+    )
+    for row in range(4):
+        part.box(
+            (x, front + 0.001, 0.06 + 0.035 * row),
+            (0.08, 0.004, 0.02),
+            (0.45, 0.46, 0.48, 1),
+            solid=False,
+        )
 
 
 def coffee_machine(kit: Kit, item: Item, style: Style) -> Forms:

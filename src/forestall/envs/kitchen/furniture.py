@@ -17,7 +17,6 @@ from forestall.envs.kitchen.layout import (
     COUNTER_HEIGHT_M,
     Item,
     columns_of,
-    drawer_columns,
 )
 from forestall.envs.kitchen.style import DARK, STEEL, Style
 
@@ -45,8 +44,7 @@ def counter(kit: Kit, item: Item, style: Style) -> Forms:
         (0, _FACE / 2, mid), (w, _FACE, _BAND - _TOE), style.front, texture=style.front_texture
     )
     columns = columns_of(w)
-    free = drawer_columns(w, sink_x)
-    drawers = dict(zip(item.drawers, reversed(free), strict=False))
+    drawers = dict(item.drawers)
     _upper_band(part, w, hole, [columns[c] for c in drawers.values()], style)
     for k, (x0, x1) in enumerate(columns):
         _front(part, x0, x1, _TOE + 0.02, _BAND - 0.004, style, bar_up=True)

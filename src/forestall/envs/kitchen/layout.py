@@ -36,7 +36,7 @@ class Item:
         width: along its x.
         depth: along its y.
         sink_x: of a counter: where the sink is.
-        drawers: of a counter: drawer instances.
+        drawers: of a counter: (drawer instance, column).
         keep_out: of a counter: (x0, x1) spans that are taken.
         extra: further instances that it carries.
         hinge: side of the hinge (+1: +x).
@@ -54,7 +54,7 @@ class Item:
     depth: float
     z: float = 0.0
     sink_x: float | None = None
-    drawers: tuple[str, ...] = ()
+    drawers: tuple[tuple[str, int], ...] = ()
     keep_out: tuple[tuple[float, float], ...] = ()
     extra: tuple[str, ...] = ()
     hinge: int = 1
@@ -66,6 +66,10 @@ class Item:
         """World (x, y, 0, yaw) of a place in its frame."""
         c, s = float(np.cos(self.yaw)), float(np.sin(self.yaw))
         return (self.x + c * x - s * y, self.y + s * x + c * y, 0.0, self.yaw)
+
+    def patch(self, local: Rect) -> Rect:
+        """A rectangle of its frame in the room."""
+        return local.turned(self.yaw).moved(self.x, self.y)
 
     def rect(self) -> Rect:
         """Footprint on the floor."""

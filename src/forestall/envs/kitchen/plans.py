@@ -9,17 +9,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from forestall.envs.kitchen.forms import Rect
 from forestall.envs.kitchen.layout import (
     COUNTER_DEPTH_M,
     COUNTER_HEIGHT_M,
     Draft,
     Item,
     Plan,
+    columns_of,
     drawer_columns,
 )
 from forestall.errors import SceneError
 
-_CORNER, _FRIDGE, _FRIDGE_GAP, _STOVE = 0.64, 0.70, 0.20, 0.76
+_CORNER, _FRIDGE, _FRIDGE_GAP, _STOVE = 0.64, 0.70, 0.25, 0.76
 _HANDLE = 0.11
 _APPLIANCES = {  # kind → free width to its left (towards -x) and right on the counter, own depth
     "microwave": (0.28, 0.39, 0.06),
@@ -49,6 +51,7 @@ def kitchen(rng: np.random.Generator) -> Plan:
     for run in runs:
         _lay_run(draft, run)
     _set_appliances(draft)
+    _set_drawers(draft)
     _hang_cabinets(draft)
     used = {r.wall for r in runs}
     free = [w for w in range(4) if w not in used]
@@ -198,7 +201,7 @@ def _lay_run(draft: Draft, run: _Run) -> None:
 
 
 def _set_appliances(draft: Draft) -> None:
-    """Stand the appliances on counters, each at an end of a free stretch, and choose drawers."""
+    """Stand the appliances on counters, each at an end of a free stretch."""
     rng = draft.rng
     kinds = {"microwave": "Microwave", "coffee_machine": "CoffeeMachine", "toaster": "Toaster"}
     for kind, category in kinds.items():
@@ -225,17 +228,30 @@ def _set_appliances(draft: Draft) -> None:
                 kind, draft.name(category), px, py, yaw, need, 0.4, z=COUNTER_HEIGHT_M, inset=inset
             )
         )
+
+
+def _set_drawers(draft: Draft) -> None:
+    """Choose two columns of counters for real drawers that open without meeting each other."""
     places = [
         (k, c)
         for k, item in enumerate(draft.items)
         if item.kind == "counter"
         for c in drawer_columns(item.width, item.sink_x)
     ]
-    for index in sorted(int(i) for i in rng.choice(len(places), size=2, replace=False)):
-        k, _ = places[index]
+    opened: list[Rect] = []
+    for index in draft.rng.permutation(len(places)):
+        k, column = places[int(index)]
         item = draft.items[k]
-        if len(item.drawers) < len(drawer_columns(item.width, item.sink_x)):
-            draft.items[k] = replace(item, drawers=(*item.drawers, draft.name("Drawer")))
+        x0, x1 = columns_of(item.width)[column]
+        room = item.patch(Rect(x0, item.depth, x1, item.depth + 0.40))
+        if any(room.overlaps(o) for o in opened):
+            continue
+        opened.append(room)
+        drawer = (draft.name("Drawer"), column)
+        draft.items[k] = replace(item, drawers=(*item.drawers, drawer))
+        if len(opened) == 2:
+            return
+    raise SceneError("no counters have room for two drawers")
 
 
 def _stretches(item: Item) -> list[tuple[float, float]]:
@@ -264,17 +280,22 @@ def _hang_cabinets(draft: Draft) -> None:
         if item.sink_x is not None:
             spans = [(low, item.sink_x - 0.60), (item.sink_x + 0.60, high)]
         options += [(item, a, b) for a, b in spans if b - a >= 0.52]
-    order = rng.permutation(len(options))
-    for hung, index in enumerate(order):
+    hung: list[Rect] = []
+    for index in rng.permutation(len(options)):
         item, a, b = options[int(index)]
         width = min(float(rng.uniform(0.52, 0.62)), b - a)
         x = float(rng.uniform(a + width / 2, b - width / 2)) if b - a > width else (a + b) / 2
         px, py, _, yaw = item.local_pose(x, 0.011)
         hinge = int(rng.choice([-1, 1]))
-        draft.items.append(
-            Item("cabinet", draft.name("Cabinet"), px, py, yaw, width, 0.33, z=1.38, hinge=hinge)
-        )
-        if hung == 1:
+        for side in (hinge, -hinge):
+            low, high = sorted((side * (width / 2 - 0.04), side * (width / 2 + 0.20)))
+            made = Item("cabinet", "", px, py, yaw, width, 0.33, z=1.38, hinge=side)
+            door = made.patch(Rect(low, 0.33, high, 0.36 + width))
+            if not any(r.overlaps(door) or r.overlaps(made.rect()) for r in hung):
+                draft.items.append(replace(made, name=draft.name("Cabinet")))
+                hung += [door, made.rect()]
+                break
+        if len(hung) == 4:
             return
     raise SceneError("no wall has room for two cabinets")
 

@@ -98,11 +98,6 @@ class KitchenWorld:
         return (self._robot.x, self._robot.y, 0.0)
 
     @property
-    def robot_yaw_rad(self) -> float:
-        """Heading of the robot's base, counter-clockwise from +x."""
-        return self._robot.yaw_rad
-
-    @property
     def eye_world_m(self) -> Float:
         """The head camera's place."""
         return self._robot.local_to_world(0, 0, EYE_HEIGHT_M)
