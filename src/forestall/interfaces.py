@@ -28,11 +28,14 @@ class Environment(Protocol):
     def reset(self, seed: int) -> None:
         """Put the world into the start state of this seed, the same to the last bit each time."""
 
-    def scan(self) -> Observation:
-        """Look around from where the robot stands (several frames)."""
+    def scan(self, thorough: bool = False) -> Observation:
+        """Look all around from where the robot stands; `thorough`: the floor at its feet, too."""
 
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
-        """Look towards world points (one frame for each, straight ahead when empty)."""
+        """Look towards world points: one frame for each group of points that one view can hold.
+
+        Straight ahead and slightly down when there are none.
+        """
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; refuse with a reason when its needs are not met."""

@@ -189,7 +189,7 @@ class Runtime:
                 break
             looks += 1
             with episode.phase("observe"):
-                observation = self._environment.scan()
+                observation = self._environment.scan(thorough=True)
         self._note(episode, context, answer, before)
         return context, answer
 

@@ -59,9 +59,9 @@ class FaultyEnvironment:
         self._done = [0] * len(self._faults)
         self._inner.reset(seed)
 
-    def scan(self) -> Observation:
+    def scan(self, thorough: bool = False) -> Observation:
         """As the wrapped environment."""
-        return self._inner.scan()
+        return self._inner.scan(thorough)
 
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
         """As the wrapped environment."""

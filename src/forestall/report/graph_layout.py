@@ -141,8 +141,8 @@ def _parents(graph: SceneGraph) -> dict[str, Relation]:
 def slots(left: Side, right: Side | None) -> tuple[Slot, ...]:
     """The rows of both sides, the gripper and what it holds first."""
     places: dict[Chain, dict[str, str]] = {}
-    for side in (left, right):
-        for n in () if side is None else side.graph.nodes:
+    for side in [left] if right is None else [left, right]:
+        for n in side.graph.nodes:
             path = side.path(n.id)
             for end in range(1, len(path)):
                 places.setdefault(path[:end], {})
@@ -251,9 +251,7 @@ def changed_states(node: ObjectNode, partner: ObjectNode | None) -> frozenset[st
     if partner is None:
         return frozenset()
     theirs = dict(partner.states)
-    return frozenset(
-        a for a, v in node.states if v is not None and theirs.get(a) not in (None, v)
-    )
+    return frozenset(a for a, v in node.states if v is not None and theirs.get(a) not in (None, v))
 
 
 def assign_lanes(found: Sequence[Lane], rows: Mapping[str, int]) -> list[Lane]:
@@ -268,15 +266,13 @@ def assign_lanes(found: Sequence[Lane], rows: Mapping[str, int]) -> list[Lane]:
     for lane in sorted(found, key=lambda x: (span(x)[1] - span(x)[0], span(x), x.label)):
         low, high = span(lane)
         free = next(
-            (
-                i
-                for i, spans in enumerate(taken)
-                if all(high < s or low > e for s, e in spans)
-            ),
+            (i for i, spans in enumerate(taken) if all(high < s or low > e for s, e in spans)),
             len(taken),
         )
         if free == len(taken):
             taken.append([])
         taken[free].append((low, high))
-        result.append(Lane(lane.subject, lane.object, lane.label, lane.directed, lane.changed, free))
+        result.append(
+            Lane(lane.subject, lane.object, lane.label, lane.directed, lane.changed, free)
+        )
     return result

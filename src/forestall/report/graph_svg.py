@@ -34,7 +34,7 @@ from forestall.types.verdict import Change, Discrepancy
 SideName = Literal["observed", "expected"]
 
 _NAME, _CHIP, _EDGE = 13.0, 11.0, 10.5
-_BOX, _PITCH, _INDENT, _MARGIN = 28.0, 40.0, 62.0, 6.0
+_BOX, _PITCH, _INDENT, _MARGIN = 28.0, 40.0, 74.0, 6.0
 _LANE_LIMIT = 5
 
 
@@ -63,7 +63,7 @@ class _Box:
 
     @property
     def name_width(self) -> float:
-        return text_width(self.name, _NAME) + 4
+        return text_width(self.name, _NAME) * 1.12 + 5  # names are bold
 
     @property
     def right(self) -> float:
@@ -314,7 +314,7 @@ def _tree_edge(drawing: _Drawing, node_id: str) -> str:
         mark = " fg-extra" if drawing.me.name == "observed" else " fg-missing"
     words = relation.predicate.replace("_", " ")
     x, top = parent.x + 13, parent.y + _BOX
-    middle = (x + child.x) / 2 + 3
+    middle = (x + child.x) / 2 + 2
     return (
         f'<g class="fg-edge{mark}"><title>{escape(str(relation))}</title>'
         f'<path d="M{_n(x)} {_n(top + 5)}V{_n(child.middle - 6)}q0 6 6 6H{_n(child.x)}"/>'

@@ -101,7 +101,7 @@ class Proactive:
 
     def _repairing(self, context: BoundaryContext, clock: _Clock) -> StrategyAnswer:
         """Inside a repair: does what is left of the plan still run from what is seen?"""
-        rest = Plan(context.remaining(), context.plan.goal)
+        rest = _rest(context)
         check = self._validator.check(rest, context.graph, context.task.goal)
         clock.lap("validate")
         verdict = Verdict(
@@ -164,7 +164,7 @@ class Proactive:
         clock: _Clock,
     ) -> StrategyAnswer:
         """Go on only if the plan at hand still checks out on what is seen."""
-        rest = Plan(context.remaining(), context.plan.goal)
+        rest = _rest(context)
         check = self._validator.check(rest, context.graph, context.task.goal)
         clock.lap("validate")
         decision = Decision.PROCEED if check.ok else Decision.STOP
@@ -180,6 +180,14 @@ class Proactive:
     def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
         """Go on: proactive monitoring ends with the last subtask's start."""
         return _GO_ON
+
+
+def _rest(context: BoundaryContext) -> Plan:
+    """What is left of the plan, with the drive before it: where the robot stands matters."""
+    start = context.index
+    if start > 0 and context.plan.subtasks[start - 1].skill == "navigate_to_obj":
+        start -= 1
+    return Plan(context.plan.subtasks[start:], context.plan.goal)
 
 
 def _common_suffix(plan: Plan, context: BoundaryContext) -> int:

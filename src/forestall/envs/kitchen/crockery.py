@@ -165,9 +165,7 @@ def vessel(part: Assembly, category: str, shape: Mapping[str, Any], states: froz
         kind="pile",
         profile=profile,
     )
-    return Form(
-        footprint, height * (1.35 if kettle else 1.0), radius, (region,), hollow_m=profile[-1][1]
-    )
+    return Form(footprint, height * (1.35 if kettle else 1.0), radius, (region,))
 
 
 def _handles(
@@ -314,9 +312,7 @@ def dish(part: Assembly, category: str, shape: Mapping[str, Any], states: frozen
         kind="pile",
         profile=((0.0, flat), (height - 0.006, radius * 0.95), (0.15, radius * 0.95)),
     )
-    return Form(
-        Rect(-radius, -radius, radius, radius), height, radius, (region,), hollow_m=radius * 0.95
-    )
+    return Form(Rect(-radius, -radius, radius, radius), height, radius, (region,))
 
 
 def bottle(part: Assembly, category: str, shape: Mapping[str, Any], states: frozenset[str]) -> Form:

@@ -30,6 +30,12 @@ SCAN_FRAMES = 7
 """Views of a full turn; 51° apart at 75° of horizontal view, so that each overlaps the next."""
 
 SCAN_TILT_RAD = math.radians(25.0)
+FLOOR_TILT_RAD = math.radians(62.0)
+"""Shows the floor from 0.05 m to 1.0 m from the robot."""
+
+ONE_VIEW_RAD = math.radians(17.0)
+"""Directions this near to a group's middle are looked at in one frame."""
+
 AHEAD_TILT_RAD = math.radians(15.0)
 
 
@@ -59,7 +65,7 @@ class Stage(World, Protocol):
     def turn_to(self, yaw_rad: float) -> float:
         """Turn on the spot to a heading; returns the simulated seconds."""
 
-    def look_at(self, point_world_m: Vec3) -> npt.NDArray[np.float64]:
+    def look_at(self, point_world_m: Sequence[float]) -> npt.NDArray[np.float64]:
         """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
 
     def camera_to_world(self, pan_rad: float, tilt_rad: float) -> npt.NDArray[np.float64]:
@@ -153,24 +159,27 @@ class KitchenEnvironment:
         self._robot = Robot(household, self._times)
         effects.settle(household, self._effect_config)
 
-    def scan(self) -> Observation:
+    def scan(self, thorough: bool = False) -> Observation:
         """Views all around: the base turns once on the spot, which takes its time."""
         world, household = self._stage, self._acting.household
         start_rad = world.robot_yaw_rad
         frames = []
-        for k in range(SCAN_FRAMES):
-            world.turn_to(start_rad + 2 * math.pi * k / SCAN_FRAMES)
-            frames.append(self._frame(world.camera_to_world(0.0, SCAN_TILT_RAD)))
+        for tilt_rad in (SCAN_TILT_RAD, FLOOR_TILT_RAD) if thorough else (SCAN_TILT_RAD,):
+            for k in range(SCAN_FRAMES):
+                world.turn_to(start_rad + 2 * math.pi * k / SCAN_FRAMES)
+                frames.append(self._frame(world.camera_to_world(0.0, tilt_rad)))
+            household.time_s += 4 * self._times.turn_s_per_90deg
         world.turn_to(start_rad)
-        household.time_s += 4 * self._times.turn_s_per_90deg
         return self._observation(frames)
 
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
-        """One frame towards each world point, straight ahead and slightly down without any."""
+        """One frame for each group of points; straight ahead and slightly down without any."""
         world = self._stage
-        poses = [world.look_at(point) for point in focus]
-        poses = poses or [world.camera_to_world(0.0, AHEAD_TILT_RAD)]
-        return self._observation([self._frame(pose) for pose in poses])
+        if not focus:
+            return self._observation([self._frame(world.camera_to_world(0.0, AHEAD_TILT_RAD))])
+        eye = world.look_at(focus[0])[:3, 3]
+        aims = _aims(np.asarray(focus, dtype=float) - eye)
+        return self._observation([self._frame(world.look_at(eye + aim)) for aim in aims])
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""
@@ -231,6 +240,22 @@ class KitchenEnvironment:
             time_s=household.time_s,
             robot_position_world_m=world.robot_position_world_m,
         )
+
+
+def _aims(ways: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
+    """Directions to look in, one for each group of (n, 3) directions that fit into one view."""
+    units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    groups: list[list[npt.NDArray[np.float64]]] = []
+    for unit in units:
+        for group in groups:
+            middle = np.mean([*group, unit], axis=0)
+            middle /= np.linalg.norm(middle)
+            if all(float(middle @ u) >= math.cos(ONE_VIEW_RAD) for u in (*group, unit)):
+                group.append(unit)
+                break
+        else:
+            groups.append([unit])
+    return [np.mean(group, axis=0) for group in groups]
 
 
 def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stage:

@@ -241,7 +241,7 @@ class FlatWorld:
         pose[:3, 3] = (self._robot_x_m, -0.5, 1.5)
         return pose
 
-    def look_at(self, point_world_m: Vec3) -> npt.NDArray[np.float64]:
+    def look_at(self, point_world_m: Sequence[float]) -> npt.NDArray[np.float64]:
         """The camera turned towards a point."""
         x, y, z = (p - q for p, q in zip(point_world_m, (self._robot_x_m, -0.5, 1.5), strict=True))
         return self.camera_to_world(

@@ -129,7 +129,6 @@ class Form:
         core_m: radius of the upright cylinder that it fills (for piles).
         regions: places on and in it.
         stance: furniture only.
-        hollow_m: of a hollow thing: inner radius at the rim, else 0.
     """
 
     footprint: Rect
@@ -137,7 +136,19 @@ class Form:
     core_m: float = 0.0
     regions: tuple[Region, ...] = ()
     stance: Stance | None = None
-    hollow_m: float = 0.0
+
+    @property
+    def middle_x(self) -> float:
+        """X of the middle of the widest free stretch on which things can be put."""
+        if not self.regions or self.regions[0].kind != "surface":
+            return self.footprint.centre[0]
+        region = self.regions[0]
+        edges = sorted((r.x0, r.x1) for r in region.keep_out)
+        x, best = region.area.x0, (0.0, self.footprint.centre[0])
+        for a, b in [*edges, (region.area.x1, region.area.x1)]:
+            best = max(best, (round(a - x, 6), (a + x) / 2))
+            x = max(x, b)
+        return best[1]
 
 
 @dataclass(frozen=True, slots=True)

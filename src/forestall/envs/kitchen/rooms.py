@@ -87,7 +87,7 @@ def _light(kit: Kit, plan: Plan) -> None:
     kit.spec.worldbody.add_light(
         name="window",
         type=mujoco.mjtLightType.mjLIGHT_POINT,
-        pos=[-x - 0.6 * plan.width * np.sign(x or 1.0) * 0.5, -y * 0.6, 1.7],
+        pos=[-0.35 * plan.width * float(np.sign(x or 1.0)), -0.6 * y, 1.7],
         dir=[0, 0, -1],
         diffuse=[fill, fill, fill * 1.1],
         castshadow=False,

@@ -16,7 +16,6 @@ from forestall.envs.kitchen.bodies import Bodies, Snapshot
 from forestall.envs.kitchen.forms import (
     FLOOR,
     Float,
-    Form,
     Instance,
     Pose,
     Rect,
@@ -96,6 +95,11 @@ class KitchenWorld:
     def robot_position_world_m(self) -> Vec3:
         """The robot's axis on the floor."""
         return (self._robot.x, self._robot.y, 0.0)
+
+    @property
+    def robot_yaw_rad(self) -> float:
+        """Heading of the robot's base, counter-clockwise from +x."""
+        return self._robot.yaw_rad
 
     @property
     def eye_world_m(self) -> Float:
@@ -194,7 +198,7 @@ class KitchenWorld:
         form, frame = self.bodies.forms[root], self.bodies.pose(root)
         stance = form.stance or Stance(form.footprint.y1)
         if root == name:
-            x = self._middle(form)
+            x = form.middle_x
             y = (form.footprint.y0 + form.footprint.y1) / 2
             local = np.array([x, y, 0, 1.0])
             target = (frame @ local)[:2]
@@ -203,18 +207,6 @@ class KitchenWorld:
             target = at[:2]
             x = float((inverse(frame) @ at)[0])
         return target, navigation.before(frame, stance, x)
-
-    def _middle(self, form: Form) -> float:
-        """X of the middle of the widest stretch on which things can be put."""
-        if not form.regions or form.regions[0].kind != "surface":
-            return form.footprint.centre[0]
-        region = form.regions[0]
-        edges = sorted((r.x0, r.x1) for r in region.keep_out)
-        x, best = region.area.x0, (0.0, form.footprint.centre[0])
-        for a, b in [*edges, (region.area.x1, region.area.x1)]:
-            best = max(best, (round(a - x, 6), (a + x) / 2))
-            x = max(x, b)
-        return best[1]
 
     def _free_floor(self, without: str = "") -> Floor:
         lying = [

@@ -1,8 +1,9 @@
 """Light of a scene and how much of it reaches a place.
 
 Key light visibility (soft shadow) and ambient visibility (occlusion nearby) are estimated with
-four rays each on every second pixel of every second row; a 3×3 tent over neighbours of the same
-surface makes that 16 rays, because the four pixels of each 2×2 block use different ones.
+four rays each on every second pixel of every second row. The sixteen places of each 4×4 block use
+different rays, and a filter over neighbours of the same surface weighs all sixteen alike, so that
+what is seen is the mean of 64 rays.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import numpy as np
 
 from forestall.envs.kitchen.rendering.tracer import Bool, Float, Int, Tracer
 
-SAMPLES = 16
+RAYS = 4
+GROUPS = 16
 STRIDE = 2
-LAMP_RADIUS_M = 0.14
+LAMP_RADIUS_M = 0.11
 AMBIENT_REACH_M = (0.06, 0.14, 0.30, 0.55)
 SURFACE_OFFSET_M = 1.5e-3
 
@@ -106,11 +108,11 @@ def fibonacci_sphere(count: int) -> Float:
     return np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1).astype(np.float32)
 
 
-_SPHERE = fibonacci_sphere(SAMPLES)
+_SPHERE = fibonacci_sphere(RAYS * GROUPS)
 
 
 def light_samples(light: Light) -> Float:
-    """(SAMPLES, 3) points spread over the bulb of a light."""
+    """(RAYS * GROUPS, 3) points spread over the bulb of a light."""
     return np.asarray(light.position_world_m + LAMP_RADIUS_M * _SPHERE, dtype=np.float32)
 
 
@@ -124,7 +126,7 @@ def visibility(
         light: the key light.
         points_world_m: (n, 3).
         normals: (n, 3) unit.
-        group: (n,) 0 to 3, which quarter of the samples each point uses.
+        group: (n,) below GROUPS, which of the sample directions each point uses.
     """
     start = points_world_m + SURFACE_OFFSET_M * normals
     lit = np.zeros(len(start), np.float32)
@@ -134,21 +136,28 @@ def visibility(
     near, lit_near, group_near = start[turned], np.zeros(len(turned), np.float32), group[turned]
     open_ = np.zeros(len(start), np.float32)
     known = True
-    quarter = SAMPLES // 4
-    for k in range(quarter):
-        lit_near += ~tracer.shadowed(near, sources, group_near + 4 * k)
-        direction = normals + 0.97 * _SPHERE[group + 4 * k]
+    for k in range(RAYS):
+        lit_near += ~tracer.shadowed(near, sources, group_near + GROUPS * k)
+        if not known:
+            continue
+        direction = normals + 0.97 * _SPHERE[group + GROUPS * ((k + group) % RAYS)]
         length = np.sqrt(np.einsum("ij,ij->i", direction, direction))
         reach = (AMBIENT_REACH_M[k] / np.maximum(length, 1e-3)).astype(np.float32)
-        hidden = tracer.occluded(start, direction, reach) if known else None
+        hidden = tracer.occluded(start, direction, reach)
         known = hidden is not None
-        open_ += 1.0 if hidden is None else ~hidden
-    lit[turned] = lit_near / quarter
-    return np.stack([lit, open_ / quarter], axis=1)
+        if hidden is not None:
+            open_ += ~hidden
+    lit[turned] = lit_near / RAYS
+    return np.stack([lit, open_ / RAYS if known else np.ones_like(open_)], axis=1)
 
 
-def tent(points_world_m: Float, normals: Float, depth_m: Float, values: Float) -> Float:
-    """3×3 tent over grid neighbours that lie on the same surface.
+def block_group(rows: Int, columns: Int) -> Int:
+    """Which sample group a place of the light grid uses: all sixteen in each 4×4 block."""
+    return np.asarray(((rows % 4) * 4 + (columns + 2 * rows) % 4).astype(np.int32))
+
+
+def smoothed(points_world_m: Float, normals: Float, depth_m: Float, values: Float) -> Float:
+    """Rows, then columns, filtered with 1 2 2 2 1 over grid neighbours on the same surface.
 
     Args:
         points_world_m: (h, w, 3).
@@ -156,30 +165,25 @@ def tent(points_world_m: Float, normals: Float, depth_m: Float, values: Float) -
         depth_m: (h, w).
         values: (h, w, c) to be smoothed.
     """
-    total, weights = 4.0 * values, np.full(depth_m.shape, 4.0, np.float32)
     tolerance = 0.004 + 0.004 * depth_m
-    height, width = depth_m.shape
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            if not dx and not dy:
-                continue
-            here = _window(height, dy), _window(width, dx)
-            there = _window(height, -dy), _window(width, -dx)
-            alike = same_surface(
-                points_world_m[here],
-                normals[here],
-                tolerance[here],
-                points_world_m[there],
-                normals[there],
+    for axis in (1, 0):
+        total, weights = 2.0 * values, np.full(depth_m.shape, 2.0, np.float32)
+        for shift, share in ((1, 2.0), (2, 1.0)):
+            first = (slice(None),) * axis + (slice(None, -shift),)
+            second = (slice(None),) * axis + (slice(shift, None),)
+            alike = np.float32(share) * same_surface(
+                points_world_m[first],
+                normals[first],
+                tolerance[first],
+                points_world_m[second],
+                normals[second],
             )
-            weight = alike * np.float32((2 - abs(dx)) * (2 - abs(dy)))
-            total[here] += weight[..., None] * values[there]
-            weights[here] += weight
-    return np.asarray(total / weights[..., None])
-
-
-def _window(length: int, shift: int) -> slice:
-    return slice(max(0, -shift), length - max(0, shift))
+            total[first] += alike[..., None] * values[second]
+            total[second] += alike[..., None] * values[first]
+            weights[first] += alike
+            weights[second] += alike
+        values = total / weights[..., None]
+    return np.asarray(values)
 
 
 def same_surface(

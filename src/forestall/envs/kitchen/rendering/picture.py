@@ -22,8 +22,9 @@ from forestall.envs.kitchen.rendering.appearance import Appearance
 from forestall.envs.kitchen.rendering.lighting import (
     STRIDE,
     Lights,
+    block_group,
     same_surface,
-    tent,
+    smoothed,
     visibility,
 )
 from forestall.envs.kitchen.rendering.shading import Surfaces, shade, to_display
@@ -153,7 +154,7 @@ class RayRenderer:
         facing = np.ascontiguousarray(normal[every]).reshape(-1, 3)
         met = np.flatnonzero(geom[every].ravel() >= 0)
         rows, columns = np.divmod(np.arange(size[0] * size[1]), size[1])
-        group = ((rows % 2) * 2 + columns % 2).astype(np.int32)
+        group = block_group(rows, columns)
         reach = np.ones((size[0] * size[1], 2), np.float32)
 
         def work(part: slice) -> None:
@@ -163,7 +164,7 @@ class RayRenderer:
             )
 
         self._each(work, _chunks(len(met), CHUNK // 2))
-        smooth = tent(
+        smooth = smoothed(
             place.reshape(*size, 3),
             facing.reshape(*size, 3),
             np.ascontiguousarray(depth[every]),
@@ -243,7 +244,8 @@ class RayRenderer:
         reach = total / np.maximum(weights, 1e-6)[:, None]
         lost = np.flatnonzero((weights < 0.005) & (hits.geom >= 0))
         if lost.size:
-            group = (at[lost] @ np.array([1.0, 2.0], np.float32)).astype(np.int32) & 3
+            pixel = np.round(at[lost]).astype(np.int32)
+            group = block_group(pixel[:, 1], pixel[:, 0])
             reach[lost] = visibility(
                 self._tracer, lights.key, points[lost], hits.normal[lost], group
             )

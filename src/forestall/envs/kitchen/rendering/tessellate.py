@@ -143,8 +143,9 @@ def _sphere(
     here, after = np.arange(segments), (np.arange(segments) + 1) % segments
     a, b = (row + here).ravel(), (row + after).ravel()
     faces = _quads(a, a + segments, b + segments, b)
-    area = np.linalg.norm(_cross_of_faces(directions, faces), axis=1)
-    return directions, faces[area > 1e-9]
+    corner = np.sin(np.repeat(polar, segments))[faces]
+    apices = (corner < 1e-9).sum(axis=1)
+    return directions, faces[apices < 2]
 
 
 def _cross_of_faces(

@@ -112,7 +112,7 @@ def _tiles() -> Float:
     inside = (pixel % (SIZE // count)) >= joint
     cell = pixel // (SIZE // count)
     shade = hashed(cell[:, None] * count + cell[None, :], 21) - 0.5
-    tone = 1.02 + 0.07 * shade + 0.10 * (fractal_noise(8, 8, 4, 22) - 0.5)
+    tone = 1.02 + 0.06 * shade + 0.05 * (fractal_noise(16, 16, 4, 22) - 0.5)
     tone = np.where(inside[:, None] & inside[None, :], tone, 0.62)
     return _tinted(tone, (1.0, 1.0, 1.0))
 
