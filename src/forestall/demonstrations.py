@@ -1,4 +1,4 @@
-"""Recording demonstrations, and the ready-made memory that is made on first use.
+"""Recording demonstrations, and the ready-made memories that are made on first use.
 
 Calls: command line → here → build, memory. Demonstration scenes have seeds of their own range, so
 that no evaluation scene is ever among them.
@@ -17,7 +17,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import forestall
-from forestall.benchmark.files import task_names
+from forestall.benchmark.files import load_task
 from forestall.build import RunConfig, prepare, run_episode
 from forestall.config import cache_dir
 from forestall.errors import ForestallError
@@ -48,11 +48,9 @@ class RecordingJob:
 def jobs_for(
     tasks: Sequence[str], kitchens: int, seed: int = DEMONSTRATION_SEEDS, states: str = "oracle"
 ) -> list[RecordingJob]:
-    """`kitchens` jobs for each task, each with scenes of its own."""
+    """`kitchens` jobs for each task, each with `RecordingJob.tries` seeds of its own."""
     return [
-        RecordingJob(task, seed + 1000 * t + 10 * k, states=states)
-        for t, task in enumerate(tasks)
-        for k in range(kitchens)
+        RecordingJob(task, seed + 10 * k, states=states) for task in tasks for k in range(kitchens)
     ]
 
 
@@ -88,6 +86,8 @@ def record_all(
 ) -> Iterator[Demonstration]:
     """Record in the order of the jobs, whatever the number of workers is."""
     finished = 0
+    if progress is not None and jobs:
+        progress(0, len(jobs), jobs[0].task)
 
     def done(job: RecordingJob) -> None:
         nonlocal finished
@@ -111,24 +111,33 @@ def record_all(
 
 
 def ready_made(
+    task: str,
     states: str = "oracle",
     announce: Callable[[str], None] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
 ) -> Path:
-    """The path of the ready-made memory, made now if it is not in the cache.
+    """The path of a task's ready-made memory, made now if it is not in the cache.
 
-    It is keyed by what it depends on: version, sources of the household and perception, task
-    files, states and the number of kitchens.
+    It holds this task's demonstrations only, so that a first run starts soon and does not depend
+    on which other tasks were run before; `forestall demos record` makes larger ones. It is keyed by
+    what it depends on: version, sources of the household and perception, the task, states.
+
+    Args:
+        task: name or file.
+        states: where object states come from.
+        announce: told once, in words, when something has to be made.
+        progress: told (done, total, what).
+        workers: processes; all cores by default.
     """
-    path = cache_dir() / "memory" / f"ready-made-{_key(states)}.db"
+    name = load_task(task).task.name
+    path = cache_dir() / "memory" / f"{name}-{_key(task, states)}.db"
     if path.exists():
         return path
-    jobs = jobs_for(task_names(), KITCHENS_PER_TASK, states=states)
+    jobs = jobs_for([task], KITCHENS_PER_TASK, states=states)
     if announce is not None:
         announce(
-            f"first use: recording {len(jobs)} demonstrations of the ten tasks "
-            f"(once; kept in {path.parent})"
+            f"first use of {name}: recording {len(jobs)} demonstrations (once; kept in {path})"
         )
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(f".{os.getpid()}.part")
@@ -143,14 +152,14 @@ def ready_made(
     return path
 
 
-def _key(states: str) -> str:
+def _key(task: str, states: str) -> str:
     digest = hashlib.blake2b(digest_size=8)
-    digest.update(json.dumps([forestall.__version__, states, KITCHENS_PER_TASK]).encode())
+    parts = [forestall.__version__, states, KITCHENS_PER_TASK, repr(load_task(task))]
+    digest.update(json.dumps(parts).encode())
     root = files("forestall")
-    for folder in ("envs/kitchen", "envs/kitchen/rendering", "perception", "types", "data/tasks"):
+    for folder in ("envs/kitchen", "envs/kitchen/rendering", "perception", "types"):
         for entry in sorted(root.joinpath(folder).iterdir(), key=lambda e: e.name):
-            if entry.name.endswith((".py", ".toml")):
+            if entry.name.endswith(".py"):
                 digest.update(entry.name.encode())
                 digest.update(entry.read_bytes())
-    digest.update(root.joinpath("data/vocabulary.toml").read_bytes())
     return digest.hexdigest()

@@ -123,7 +123,7 @@ def _comparisons(repeat: int, seed: int) -> list[dict[str, Any]]:
 def _episodes(seed: int) -> list[dict[str, Any]]:
     cached = (cache_dir() / "memory").exists()
     started = time.perf_counter()
-    with open_store(ready_made()) as store:
+    with open_store(ready_made("heat-potato")) as store:
         demonstrations = list(store.all())
     rows = [
         _row(

@@ -276,7 +276,7 @@ PHASES = (("perceive", 0.182), ("retrieve", 0.004), ("compare", 0.011))
 
 
 def boundary(
-    position: int, index: int, subtask: Subtask, *, alarm: bool = False, **pictures: object
+    index: int, subtask: Subtask, *, alarm: bool = False, **pictures: object
 ) -> BoundaryRecord:
     bowl = index >= ALARM_INDEX - 1
     more = (("diagnose", 0.006), ("replan", 0.021)) if alarm else ()
@@ -285,7 +285,7 @@ def boundary(
         subtask=subtask,
         graph=observed_graph(bowl=bowl),
         scoped=observed_graph(subtask, bowl=bowl),
-        observation=observation(position, **pictures),  # type: ignore[arg-type]
+        observation=observation(index, **pictures),  # type: ignore[arg-type]
         looks=1,
         verdict=verdict(subtask, index, alarm),
         diagnosis=diagnosis() if alarm else None,
@@ -300,14 +300,13 @@ def potato_record(**pictures: object) -> EpisodeRecord:
     rest = solved().plan
     assert rest is not None
     done = (*Plan.parse(NOMINAL).subtasks[:ALARM_INDEX], *rest.subtasks)
-    boundaries = []
-    for index, subtask in enumerate(done):
-        if index == ALARM_INDEX:
-            blocked = Subtask.parse("pick_up(Plate-1)")
-            boundaries.append(boundary(len(boundaries), index, blocked, alarm=True, **pictures))
-        boundaries.append(boundary(len(boundaries), index, subtask, **pictures))
+    judged = list(done)
+    judged.insert(ALARM_INDEX, Subtask.parse("pick_up(Plate-1)"))
+    boundaries = [boundary(i, s, alarm=i == ALARM_INDEX, **pictures) for i, s in enumerate(judged)]
     executed = tuple(
-        ExecutedRecord(s, SkillOutcome(SkillStatus.SUCCEEDED, 4.0), i) for i, s in enumerate(done)
+        ExecutedRecord(s, SkillOutcome(SkillStatus.SUCCEEDED, 4.0), i)
+        for i, s in enumerate(judged)
+        if i != ALARM_INDEX
     )
     return EpisodeRecord(
         task=task(),
@@ -351,7 +350,7 @@ def unjudged_record() -> EpisodeRecord:
         whole,
         strategy="none",
         boundaries=tuple(
-            replace(boundary(i, i, s), observation=None, verdict=None, seconds=(("perceive", 0.1),))
+            replace(boundary(i, s), observation=None, verdict=None, seconds=(("perceive", 0.1),))
             for i, s in enumerate(plan[:9])
         ),
         executed=tuple(
@@ -381,7 +380,7 @@ def troubled_record() -> EpisodeRecord:
         ("Shelf-1",),
     )
     first = replace(
-        boundary(0, 0, Subtask("navigate_to_obj", (odd,)), alarm=True),
+        boundary(0, Subtask("navigate_to_obj", (odd,)), alarm=True),
         diagnosis=Diagnosis("the difference is harmless", ()),
         replan=None,
         graph=graph,
@@ -396,10 +395,10 @@ def troubled_record() -> EpisodeRecord:
         note="no reference above the floor <0.5>",
     )
     second = replace(
-        boundary(1, 1, Subtask("pick_up", (odd,))), verdict=alone, graph=graph, scoped=graph
+        boundary(1, Subtask("pick_up", (odd,))), verdict=alone, graph=graph, scoped=graph
     )
     third = replace(
-        boundary(2, 2, Subtask.parse("put_in(Plate-1, Microwave-1)"), alarm=True),
+        boundary(2, Subtask.parse("put_in(Plate-1, Microwave-1)"), alarm=True),
         replan=Replan(
             ReplanOutcome.UNSOLVABLE,
             check=PlanCheck(False, 1, "no room <left>", (Literal.parse("vacant(Microwave-1)"),)),

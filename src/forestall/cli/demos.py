@@ -68,49 +68,61 @@ def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
     """List the demonstrations of a memory.
 
     Args:
-        memory: a demonstration file; the ready-made one by default.
+        memory: a demonstration file; by default every ready-made one in the cache.
         as_json: print JSON.
     """
-    loaded, path = load_memory(memory, "oracle", False)
-    rows: list[dict[str, Any]] = [
-        {"id": d.id, "task": d.task, "scene": d.scene, "steps": len(d.steps), **dict(d.perception)}
-        for d in loaded
-    ]
+    from forestall.config import cache_dir
+    from forestall.memory.store import open_store
+
+    paths = [memory] if memory else sorted((cache_dir() / "memory").glob("*.db"))
+    rows: list[dict[str, Any]] = []
+    for path in paths:
+        with open_store(path) as store:
+            for d in store.all():
+                row = {"id": d.id, "task": d.task, "scene": d.scene, "steps": len(d.steps)}
+                rows.append({"memory": str(path), **row, **dict(d.perception)})
     if as_json:
-        print(json.dumps({"memory": path, "demonstrations": rows}, indent=2))
+        print(json.dumps(rows, indent=2))
         return 0
     from forestall.cli.listing import print_table
 
     print_table(
-        ("id", "task", "scene", "steps", "states from"),
+        ("task", "scene", "steps", "states from", "memory"),
         [
-            (r["id"], r["task"], r["scene"], str(r["steps"]), str(r.get("state_estimator", "")))
+            (r["task"], r["scene"], str(r["steps"]), r.get("state_estimator", ""), r["memory"])
             for r in rows
         ],
     )
-    print(path)
     return 0
 
 
-def load_memory(memory: Path | None, states: str, quiet: bool) -> tuple[list[Demonstration], str]:
+def load_memory(
+    memory: Path | None, task: str, states: str, quiet: bool
+) -> tuple[list[Demonstration], str]:
     """Every demonstration of a memory, and its path.
+
+    Args:
+        memory: a demonstration file; None for the ready-made one of the task.
+        task: name or file.
+        states: where object states come from.
+        quiet: no progress on standard error.
 
     Raises:
         MemoryFileError: see `memory.store`.
     """
     from forestall.memory.store import open_store
 
-    path = memory or _ready_made(states, quiet)
+    path = memory or _ready_made(task, states, quiet)
     with open_store(path) as store:
-        return list(store.all()), str(path)
+        return list(store.required()), str(path)
 
 
-def _ready_made(states: str, quiet: bool) -> Path:
+def _ready_made(task: str, states: str, quiet: bool) -> Path:
     from forestall.cli.progress import bar
     from forestall.demonstrations import ready_made
 
     def announce(text: str) -> None:
         print(f"forestall: {text}", file=sys.stderr)
 
-    with bar("recording demonstrations", quiet=quiet) as feed:
-        return ready_made(states, announce, feed)
+    with bar("recording", quiet=quiet) as feed:
+        return ready_made(task, states, announce, feed)

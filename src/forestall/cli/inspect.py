@@ -92,15 +92,18 @@ def check(
         folder: the observation (docs/observation-format.md).
         subtask: what is about to start, e.g. "put_in(Plate, Microwave)".
         task: the task's name, so that its own demonstrations are preferred.
-        memory: a demonstration file; the ready-made one by default.
+        memory: a demonstration file; the ready-made one of the task by default.
         threshold: alarm when no demonstration reaches this score.
         as_json: print JSON.
     """
     from forestall.cli.demos import load_memory
+    from forestall.errors import InputError
     from forestall.stored import judge_stored
     from forestall.types.verdict import Decision
 
-    demonstrations, path = load_memory(memory, "oracle", as_json)
+    if memory is None and task is None:
+        raise InputError("give --memory FILE, or --task NAME to compare with its ready-made memory")
+    demonstrations, path = load_memory(memory, task or "", "oracle", as_json)
     started = time.perf_counter()
     graph, verdict, diagnosis = judge_stored(folder, subtask, task, demonstrations, threshold)
     data = _verdict_json(verdict, diagnosis) | {

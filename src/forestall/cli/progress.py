@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar that is fed with (done, total, what)."""
+    """A bar that is fed with (done, total, what) and shown from the first time on."""
     if quiet:
         yield lambda done, total, what: None
         return
@@ -23,20 +23,21 @@ def bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[int, int, str]
         TimeRemainingColumn,
     )
 
-    console = Console(file=sys.stderr)
     progress = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        console=console,
-        disable=False,
+        console=Console(file=sys.stderr),
     )
-    with progress:
-        row = progress.add_task(title, total=None)
+    row = progress.add_task(title, total=None)
 
-        def feed(done: int, total: int, what: str) -> None:
-            progress.update(row, completed=done, total=total, description=f"{title}: {what}")
+    def feed(done: int, total: int, what: str) -> None:
+        progress.start()
+        progress.update(row, completed=done, total=total, description=f"{title}: {what}")
 
+    try:
         yield feed
+    finally:
+        progress.stop()

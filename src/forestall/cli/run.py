@@ -55,7 +55,7 @@ def run(
     config = RunConfig(task, scenario, strategy, seed, renderer, states=states, threshold=threshold)
     prepared = prepare(config)
     folder = out or _new_folder(prepared.loaded.task.name, scenario, strategy, seed)
-    demonstrations, used = _memory(strategy, memory, states, quiet)
+    demonstrations, used = _memory(task, strategy, memory, states, quiet)
     page = folder / "index.html"
     recorder = RunRecorder(
         folder,
@@ -76,13 +76,13 @@ def run(
 
 
 def _memory(
-    strategy: str, memory: Path | None, states: str, quiet: bool
+    task: str, strategy: str, memory: Path | None, states: str, quiet: bool
 ) -> tuple[list[Demonstration] | None, str | None]:
     if strategy == "none":
         return None, None
     from forestall.cli.demos import load_memory
 
-    return load_memory(memory, states, quiet)
+    return load_memory(memory, task, states, quiet)
 
 
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:

@@ -44,7 +44,7 @@ class Alarm:
     """A verdict that asked for replanning, and what came of it."""
 
     position: int  # of its boundary in the record
-    index: int  # position in the executed sequence
+    index: int  # of its boundary
     subtask: Subtask
     score: float | None
     threshold: float
@@ -115,10 +115,10 @@ def new_plan(replan: Replan | None) -> Plan | None:
     return replan.plan
 
 
-def boundary_of(context: BoundaryContext, answer: StrategyAnswer) -> BoundaryRecord:
+def boundary_of(index: int, context: BoundaryContext, answer: StrategyAnswer) -> BoundaryRecord:
     """The record of a boundary as a listener sees it."""
     return BoundaryRecord(
-        index=context.done,
+        index=index,
         subtask=context.subtask,
         graph=context.graph,
         scoped=context.scoped,
@@ -157,12 +157,12 @@ def alarms(record: EpisodeRecord) -> tuple[Alarm, ...]:
     return tuple(
         alarm
         for position, boundary in enumerate(record.boundaries)
-        if (alarm := alarm_at(position, boundary)) is not None
+        if (alarm := alarm_at(position, boundary, adopted(boundary, record.executed))) is not None
     )
 
 
-def alarm_at(position: int, boundary: BoundaryRecord) -> Alarm | None:
-    """The alarm of one boundary, None where there was none."""
+def alarm_at(position: int, boundary: BoundaryRecord, plan: Plan | None) -> Alarm | None:
+    """The alarm of one boundary, None where there was none; `plan` is what it led to."""
     verdict, diagnosis = boundary.verdict, boundary.diagnosis
     if verdict is None or not is_alarm(boundary):
         return None
@@ -175,14 +175,23 @@ def alarm_at(position: int, boundary: BoundaryRecord) -> Alarm | None:
         cause=cause_of(boundary),
         must_change=() if diagnosis is None else tuple(map(str, diagnosis.must_change)),
         culprits=() if diagnosis is None else diagnosis.culprits,
-        replanned=new_plan(boundary.replan) is not None,
+        replanned=plan is not None,
         outcome=outcome_of(boundary),
     )
 
 
+def adopted(boundary: BoundaryRecord, executed: Sequence[ExecutedRecord]) -> Plan | None:
+    """The plan that the run went on with, None where it kept the old one.
+
+    A run whose number of plans is used up executes the subtask of the boundary all the same.
+    """
+    kept = any(e.index == boundary.index and e.subtask == boundary.subtask for e in executed)
+    return None if kept else new_plan(boundary.replan)
+
+
 def replans(record: EpisodeRecord) -> int:
     """How many plans were replaced during the run."""
-    return sum(new_plan(b.replan) is not None for b in record.boundaries)
+    return sum(adopted(b, record.executed) is not None for b in record.boundaries)
 
 
 def same_step(a: Subtask, b: Subtask) -> bool:
@@ -211,8 +220,8 @@ def moments(record: EpisodeRecord) -> tuple[Moment, ...]:
         done = executed.get(index)
         for position in positions:
             boundary = record.boundaries[position]
-            before = plan[max(0, index - adopted_at) :]
-            after = new_plan(boundary.replan)
+            before = plan[_progress(record, adopted_at, index) :]
+            after = adopted(boundary, record.executed)
             if after is not None:
                 plan, adopted_at = after.subtasks, index
             mine = done if position == positions[-1] else None
@@ -225,19 +234,26 @@ def moments(record: EpisodeRecord) -> tuple[Moment, ...]:
                     mine,
                     before,
                     None if after is None else after.subtasks,
-                    _mark(boundary, mine),
+                    _mark(boundary, mine, after),
                 )
             )
             if mine is not None:
                 done = None
         if done is not None:
-            before = plan[max(0, index - adopted_at) :]
-            result.append(Moment(None, None, done, before, None, _mark(None, done)))
+            before = plan[_progress(record, adopted_at, index) :]
+            result.append(Moment(None, None, done, before, None, _mark(None, done, None)))
     return tuple(result)
 
 
-def _mark(boundary: BoundaryRecord | None, executed: ExecutedRecord | None) -> Mark:
-    if boundary is not None and new_plan(boundary.replan) is not None:
+def _progress(record: EpisodeRecord, adopted_at: int, index: int) -> int:
+    """How many subtasks were executed since a plan was adopted."""
+    return sum(adopted_at <= e.index < index for e in record.executed)
+
+
+def _mark(
+    boundary: BoundaryRecord | None, executed: ExecutedRecord | None, after: Plan | None
+) -> Mark:
+    if after is not None:
         return Mark.REPLANNED
     if executed is not None and executed.outcome.status is SkillStatus.REFUSED:
         return Mark.REFUSED

@@ -64,10 +64,7 @@ class RunRecorder:
         self._provenance = dict(provenance or {})
         self._page = page
         self._lines: TextIO | None = None
-        self._rest: tuple[Subtask, ...] = ()
-        self._adopted_at = 0
         self._position = 0
-        self._executed = 0
 
     def on_start(self, task: Task, plan: Plan, seed: int) -> None:
         """The episode begins."""
@@ -75,8 +72,7 @@ class RunRecorder:
         self.folder.mkdir(parents=True, exist_ok=True)
         (self.folder / RECORD_NAME).unlink(missing_ok=True)
         self._lines = (self.folder / LINES_NAME).open("w", encoding="utf-8", newline="\n")
-        self._rest, self._adopted_at = plan.subtasks, 0
-        self._position = self._executed = 0
+        self._position = 0
         self._write(
             "start",
             kind=KIND,
@@ -93,12 +89,9 @@ class RunRecorder:
 
     def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
         """A boundary was judged."""
-        boundary = boundary_of(context, answer)
+        boundary = boundary_of(self._position, context, answer)
         plan = new_plan(boundary.replan)
-        before = self._rest[max(0, boundary.index - self._adopted_at) :]
-        if plan is not None:
-            self._rest, self._adopted_at = plan.subtasks, boundary.index
-        alarm = alarm_at(self._position, boundary)
+        alarm = alarm_at(self._position, boundary, plan)
         self._write(
             "boundary",
             boundary=boundary_json(
@@ -106,7 +99,7 @@ class RunRecorder:
                 position=self._position,
                 image=_write_image(self.folder, boundary),
                 mark=None,
-                before=before,
+                before=context.remaining(),
                 after=None if plan is None else plan.subtasks,
             ),
             alarm=None if alarm is None else alarm_json(alarm),
@@ -115,9 +108,8 @@ class RunRecorder:
 
     def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
         """A subtask was executed."""
-        executed = ExecutedRecord(subtask, outcome, self._executed)
+        executed = ExecutedRecord(subtask, outcome, max(0, self._position - 1))
         self._write("executed", time_s=time_s, executed=executed_json(executed))
-        self._executed += 1
 
     def on_end(self, record: EpisodeRecord) -> None:
         """The episode is over."""

@@ -25,16 +25,22 @@ from forestall.envs.kitchen.rendering.tracer import (
     drawn,
     facing,
 )
+from forestall.envs.kitchen.rendering.vectors import norm, rows
+
+_FAR_M = 1e30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """One committed Embree scene with what is needed to read its hits."""
+    """One committed Embree scene with what is needed to read its hits.
+
+    The tables have one row more than there are triangles: Embree's -1 for no hit reads the last.
+    """
 
     scene: EmbreeScene
-    geom: Int  # (f,) geom of each triangle
-    normal: Float  # (f, 3) unit face normals
-    smooth: Bool  # (f,)
+    geom: Int  # (f + 1,) geom of each triangle, then -1
+    normal: Float  # (f + 1, 3) unit face normals, then 0
+    smooth: Bool  # (f + 1,), then False
     corners: Float  # (f, 3, 3) corner normals
 
 
@@ -73,15 +79,15 @@ class EmbreeTracer:
         self._state: _State | None = None
         welded = np.asarray(model.body_weldid)[model.geom_bodyid] == 0
         self._still: Bool = np.asarray(welded)
-        self._parts: list[_Part | None] = [None, None]
+        self._parts: list[_Part] = []
 
     def update(self, data: mujoco.MjData) -> None:
         """Rebuild what changed since the last call."""
         new, old = _State.read(self._model, data), self._state
         if old is None:
             changed = np.ones(self._model.ngeom, dtype=bool)
+            self._still = self._still & new.visible
             rebuild_still = True
-            self._still &= new.visible
         else:
             changed = new.changed_since(old)
             if not changed.any():
@@ -91,9 +97,8 @@ class EmbreeTracer:
             rebuild_still = bool((changed & self._still).any())
             self._still = self._still & ~changed
         self._state = new
-        if rebuild_still:
-            self._parts[0] = self._build(new, np.flatnonzero(new.visible & self._still))
-        self._parts[1] = self._build(new, np.flatnonzero(new.visible & ~self._still))
+        still = self._part(new, new.visible & self._still) if rebuild_still else self._parts[0]
+        self._parts = [still, self._part(new, new.visible & ~self._still)]
 
     def closest(self, origin_world_m: Float, directions: Float) -> Hits:
         """See `Tracer.closest`."""
@@ -102,53 +107,45 @@ class EmbreeTracer:
 
     def beyond(self, origins_world_m: Float, directions: Float) -> Hits:
         """See `Tracer.beyond`."""
-        n = len(directions)
-        far = np.full(n, 1e30, np.float32)
-        geom = np.full(n, -1, np.int32)
-        normal = np.zeros((n, 3), np.float32)
-        for part in self._parts:
-            if part is None:
-                continue
-            out = part.scene.run(origins_world_m, directions, dists=far, output=True)
-            hit = np.flatnonzero(out["primID"] >= 0)
-            face = out["primID"][hit]
-            geom[hit] = part.geom[face]
-            normal[hit] = part.normal[face]
-            bent = np.flatnonzero(part.smooth[face])
-            if bent.size:
-                at = hit[bent]
-                u, v = out["u"][at, None], out["v"][at, None]
-                corner = part.corners[face[bent]]
-                mixed = corner[:, 0] * (1 - u - v) + corner[:, 1] * u + corner[:, 2] * v
-                mixed /= np.sqrt(np.einsum("ij,ij->i", mixed, mixed))[:, None] + 1e-12
-                normal[at] = mixed
-        far[geom < 0] = 0
-        return Hits(geom, far, facing(normal, directions))
+        distance = np.full(len(directions), _FAR_M, np.float32)
+        still, moving = self._parts
+        out = still.scene.run(origins_world_m, directions, dists=distance, output=True)
+        face = out["primID"]
+        geom, normal = rows(still.geom, face), rows(still.normal, face)
+        _bend(normal, still, face, np.arange(len(face)), out)
+        out = moving.scene.run(origins_world_m, directions, dists=distance, output=True)
+        nearer = np.flatnonzero(out["primID"] >= 0)
+        face = rows(out["primID"], nearer)
+        geom[nearer], normal[nearer] = rows(moving.geom, face), rows(moving.normal, face)
+        _bend(normal, moving, face, nearer, out)
+        distance[geom < 0] = 0
+        return Hits(geom, distance, facing(normal, directions))
 
     def shadowed(self, points_world_m: Float, sources_world_m: Float, source: Int) -> Bool:
         """See `Tracer.shadowed`."""
-        directions = sources_world_m[source] - points_world_m
-        length = np.sqrt(np.einsum("ij,ij->i", directions, directions))
-        reach = np.maximum(1 - LAMP_CLEARANCE_M / np.maximum(length, 1e-6), 0)
+        directions = rows(sources_world_m, source) - points_world_m
+        reach = np.maximum(1 - LAMP_CLEARANCE_M / np.maximum(norm(directions), 1e-6), 0)
         return self.occluded(points_world_m, directions, reach.astype(np.float32))
 
     def occluded(self, points_world_m: Float, directions: Float, reach: Float) -> Bool:
         """See `Tracer.occluded`."""
-        blocked = np.zeros(len(directions), dtype=bool)
-        free = np.arange(len(directions))
-        for part in self._parts:
-            if part is None or not free.size:
-                continue
+        answer = self._parts[0].scene.run(points_world_m, directions, dists=reach, query="OCCLUDED")
+        blocked: Bool = np.asarray(answer >= 0)
+        for part in self._parts[1:]:
+            free = np.flatnonzero(~blocked)
             answer = part.scene.run(
-                points_world_m[free], directions[free], dists=reach[free], query="OCCLUDED"
+                rows(points_world_m, free),
+                rows(directions, free),
+                dists=rows(reach, free),
+                query="OCCLUDED",
             )
-            blocked[free[answer >= 0]] = True
-            free = free[answer < 0]
+            blocked[free] = answer >= 0
         return blocked
 
-    def _build(self, state: _State, geoms: npt.NDArray[np.intp]) -> _Part | None:
+    def _part(self, state: _State, chosen: Bool) -> _Part:
+        geoms = np.flatnonzero(chosen)
         if not geoms.size:
-            return None
+            return _empty_part(EmbreeScene(self._device))
         sets = [self._local(int(g)) for g in geoms]
         per_vertex = np.repeat(geoms, [len(s.vertices_m) for s in sets])
         faces_of = [len(s.faces) for s in sets]
@@ -168,9 +165,42 @@ class EmbreeTracer:
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-30
         smooth = np.concatenate([s.smooth for s in sets])
-        return _Part(scene, per_face.astype(np.int32), normal, smooth, corners)
+        return _Part(
+            scene,
+            np.append(per_face, -1).astype(np.int32),
+            np.concatenate([normal, np.zeros((1, 3), np.float32)]),
+            np.append(smooth, False),
+            corners,
+        )
 
     def _local(self, geom: int) -> TriangleSet:
         if geom not in self._triangles:
             self._triangles[geom] = tessellate(self._model, geom)
         return self._triangles[geom]
+
+
+def _empty_part(scene: EmbreeScene) -> _Part:
+    return _Part(
+        scene,
+        np.full(1, -1, np.int32),
+        np.zeros((1, 3), np.float32),
+        np.zeros(1, dtype=bool),
+        np.zeros((0, 3, 3), np.float32),
+    )
+
+
+def _bend(
+    normal: Float, part: _Part, face: Int, at: npt.NDArray[np.intp], out: dict[str, Float]
+) -> None:
+    """Interpolate the normals of smooth triangles; `at` are the rays that hit `face`."""
+    some = np.flatnonzero(rows(part.smooth, face))
+    if not some.size:
+        return
+    at = rows(at, some)
+    u, v = rows(out["u"], at), rows(out["v"], at)  # weights of the second and third corner
+    corner = rows(part.corners, rows(face, some))
+    mixed = corner[:, 0] * (1 - u - v)[:, None]
+    mixed += corner[:, 1] * u[:, None]
+    mixed += corner[:, 2] * v[:, None]
+    mixed /= (norm(mixed) + 1e-12)[:, None]
+    normal[at] = mixed

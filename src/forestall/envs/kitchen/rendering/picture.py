@@ -29,6 +29,7 @@ from forestall.envs.kitchen.rendering.lighting import (
 )
 from forestall.envs.kitchen.rendering.shading import Surfaces, shade, to_display
 from forestall.envs.kitchen.rendering.tracer import Bool, Float, Hits, Int, Tracer
+from forestall.envs.kitchen.rendering.vectors import dot, rows
 from forestall.errors import InputError
 from forestall.types.observation import Frame, Intrinsics
 
@@ -153,8 +154,8 @@ class RayRenderer:
         place = np.ascontiguousarray(points.reshape(*geom.shape, 3)[every]).reshape(-1, 3)
         facing = np.ascontiguousarray(normal[every]).reshape(-1, 3)
         met = np.flatnonzero(geom[every].ravel() >= 0)
-        rows, columns = np.divmod(np.arange(size[0] * size[1]), size[1])
-        group = block_group(rows, columns)
+        row, column = np.divmod(np.arange(size[0] * size[1]), size[1])
+        group = block_group(row, column)
         reach = np.ones((size[0] * size[1], 2), np.float32)
 
         def work(part: slice) -> None:
@@ -170,17 +171,13 @@ class RayRenderer:
             np.ascontiguousarray(depth[every]),
             reach.reshape(*size, 2),
         )
-        return View(
-            origin, rotation, (size[0], size[1]), place, facing, smooth.reshape(-1, 2)
-        )
+        return View(origin, rotation, (size[0], size[1]), place, facing, smooth.reshape(-1, 2))
 
-    def _colour(
-        self, view: View, lights: Lights, hits: Hits, points: Float, edges: Bool
-    ) -> Float:
+    def _colour(self, view: View, lights: Lights, hits: Hits, points: Float, edges: Bool) -> Float:
         height, width = edges.shape
         reach = _enlarged(view.grid_reach.reshape(*view.grid_size, 2), height, width)
         reach = reach.reshape(-1, 2)
-        near_edges = grown(edges, STRIDE + 1).ravel()
+        near_edges = grown(edges, STRIDE).ravel()
         colour = np.empty((height * width, 3), np.float32)
 
         def work(part: slice) -> None:
@@ -188,8 +185,8 @@ class RayRenderer:
             light = reach[part]
             careful = np.flatnonzero(near_edges[part])
             if careful.size:
-                rows, columns = np.divmod(careful + part.start, width)
-                at = np.stack([columns, rows], axis=1).astype(np.float32)
+                row, column = np.divmod(careful + part.start, width)
+                at = np.stack([column, row], axis=1).astype(np.float32)
                 chosen = _pick(some, careful)
                 light[careful] = self._reach(view, lights, chosen, points[part][careful], at)
             directions = self._rays[part] @ view.rotation.T
@@ -199,11 +196,11 @@ class RayRenderer:
         return colour.reshape(height, width, 3)
 
     def _smooth_edges(self, view: View, lights: Lights, colour: Float, edges: Bool) -> None:
-        rows, columns = np.nonzero(edges)
+        row, column = np.nonzero(edges)
         camera = self._intrinsics
 
         def work(part: slice) -> None:
-            centre = np.stack([columns[part], rows[part]], axis=1).astype(np.float32)
+            centre = np.stack([column[part], row[part]], axis=1).astype(np.float32)
             at = (centre[:, None] + np.array(_SUBPIXELS, np.float32)).reshape(-1, 2)
             rays = np.ones((len(at), 3), np.float32)
             rays[:, 0] = (at[:, 0] - camera.cx) / camera.fx
@@ -214,10 +211,10 @@ class RayRenderer:
             light = self._reach(view, lights, hits, points, at)
             samples = self._layered(view, lights, hits, points, directions, light)
             total = samples.reshape(-1, len(_SUBPIXELS), 3).sum(axis=1)
-            here = rows[part], columns[part]
+            here = row[part], column[part]
             colour[here] = (colour[here] + total) / (len(_SUBPIXELS) + 1)
 
-        self._each(work, _chunks(len(rows), CHUNK // 4))
+        self._each(work, _chunks(len(row), CHUNK // 4))
 
     def _reach(self, view: View, lights: Lights, hits: Hits, points: Float, at: Float) -> Float:
         """Light reach of hits seen at pixels `at` (n, 2): from the grid, else by own rays."""
@@ -234,12 +231,12 @@ class RayRenderer:
                 index = y * width + x
                 alike = same_surface(
                     points, hits.normal, tolerance,
-                    view.grid_points[index], view.grid_normals[index],
+                    rows(view.grid_points, index), rows(view.grid_normals, index),
                 )  # fmt: skip
                 share_x = fraction[:, 0] if dx else 1 - fraction[:, 0]
                 share_y = fraction[:, 1] if dy else 1 - fraction[:, 1]
                 weight = alike * (share_x * share_y + np.float32(0.01))
-                total += weight[:, None] * view.grid_reach[index]
+                total += weight[:, None] * rows(view.grid_reach, index)
                 weights += weight
         reach = total / np.maximum(weights, 1e-6)[:, None]
         lost = np.flatnonzero((weights < 0.005) & (hits.geom >= 0))
@@ -262,10 +259,8 @@ class RayRenderer:
         layers: int = LAYERS,
     ) -> Float:
         """Colours, with what lies behind transparent surfaces shining through."""
-        colour = shade(
-            self._surfaces, lights, hits, points, directions, reach, self._pixel_m
-        )
-        alpha = self._surfaces.alpha[hits.geom]
+        colour = shade(self._surfaces, lights, hits, points, directions, reach, self._pixel_m)
+        alpha = rows(self._surfaces.alpha, hits.geom)
         clear = np.flatnonzero((alpha < 0.98) & (hits.geom >= 0))
         if clear.size and layers:
             along = directions[clear]
@@ -303,7 +298,7 @@ def discontinuities(geom: Int, normal: Float, depth_m: Float) -> Bool:
         (np.s_[:-1], np.s_[1:]),
     ):
         here, there = inverse[first], inverse[second]
-        turn = np.einsum("...i,...i->...", normal[first], normal[second])
+        turn = dot(normal[first], normal[second])
         step = np.abs(here - there) > 0.04 * np.minimum(here, there)
         hit = geom[first] >= 0
         jump = (geom[first] != geom[second]) | (hit & ((turn < 0.85) | step))
@@ -327,19 +322,19 @@ def grown(mask: Bool, by: int) -> Bool:
 
 def _enlarged(grid: Float, height: int, width: int) -> Float:
     """Bilinear enlargement by STRIDE (2): grid samples stay where they were taken."""
-    rows = np.empty((height, grid.shape[1], grid.shape[2]), np.float32)
-    rows[::2] = grid
+    tall = np.empty((height, grid.shape[1], grid.shape[2]), np.float32)
+    tall[::2] = grid
     below = np.concatenate([grid[1:], grid[-1:]])
-    rows[1::2] = 0.5 * (grid + below)[: height // 2]
+    tall[1::2] = 0.5 * (grid + below)[: height // 2]
     out = np.empty((height, width, grid.shape[2]), np.float32)
-    out[:, ::2] = rows
-    right = np.concatenate([rows[:, 1:], rows[:, -1:]], axis=1)
-    out[:, 1::2] = 0.5 * (rows + right)[:, : width // 2]
+    out[:, ::2] = tall
+    right = np.concatenate([tall[:, 1:], tall[:, -1:]], axis=1)
+    out[:, 1::2] = 0.5 * (tall + right)[:, : width // 2]
     return out
 
 
 def _pick(hits: Hits, index: npt.NDArray[np.intp]) -> Hits:
-    return Hits(hits.geom[index], hits.distance[index], hits.normal[index])
+    return Hits(rows(hits.geom, index), rows(hits.distance, index), rows(hits.normal, index))
 
 
 def _camera_rays(camera: Intrinsics) -> Float:

@@ -23,6 +23,7 @@ from forestall.envs.kitchen.rendering.tracer import (
     Int,
     facing,
 )
+from forestall.envs.kitchen.rendering.vectors import norm
 
 _FAR_M = 1e6
 _GROUPS = (np.arange(6) < DRAWN_GROUPS).astype(np.uint8)
@@ -77,7 +78,7 @@ class MujocoTracer:
                 some = np.flatnonzero(source == k)
                 rays = points_world_m[some] - sources_world_m[k]
                 _, distance, _ = self._cast(data, sources_world_m[k], rays)
-                length = np.sqrt(np.einsum("ij,ij->i", rays, rays))
+                length = norm(rays)
                 before = (distance >= 0) & (distance < 1 - 1e-4)
                 dark[some] = before & (distance * length > LAMP_CLEARANCE_M)
         return dark

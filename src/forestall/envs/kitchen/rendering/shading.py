@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from forestall.envs.kitchen.rendering.appearance import TEXTURES, Appearance
 from forestall.envs.kitchen.rendering.lighting import Light, Lights
-from forestall.envs.kitchen.rendering.textures import texture
+from forestall.envs.kitchen.rendering.textures import TINTS, texture
 from forestall.envs.kitchen.rendering.tracer import Float, Hits, Int
+from forestall.envs.kitchen.rendering.vectors import dot, norm, rotated_back, rows
 
 _SHINE: dict[str | None, tuple[float, float, float]] = {
     # highlight, exponent, mirror-like reflection of the room
@@ -27,6 +28,11 @@ _SHINE: dict[str | None, tuple[float, float, float]] = {
 _BACKGROUND = (0.55, 0.62, 0.70)
 _GLOW = 2.2
 _GAMMA_STEPS = 1 << 14
+_TINTS = np.array([*(TINTS[name] for name in TEXTURES), (1.0, 1.0, 1.0)], np.float32)
+_SHIFT_M = np.stack([0.113 * np.arange(64), 0.071 * (37 * np.arange(64) % 64)], 1).astype(
+    np.float32
+)
+"""Where a geom's texture begins, so that neighbours do not show the same piece."""
 
 
 class Surfaces:
@@ -42,6 +48,7 @@ class Surfaces:
         )
         shine = [_SHINE.get(t, _SHINE[None]) for t in appearance.texture]
         self.shine: Float = np.array(shine, dtype=np.float32).reshape(-1, 3)
+        self.metal: Float = (self.kind == TEXTURES.index("metal")).astype(np.float32)
         for kind in np.unique(self.kind[self.kind >= 0]):
             texture(TEXTURES[kind])
         self.albedo: Float = np.zeros((model.ngeom, 3), np.float32)
@@ -91,30 +98,30 @@ def shade(
         pixel_m: width of a pixel at 1 m.
     """
     geom, normal = hits.geom, hits.normal
-    albedo = surfaces.albedo[geom]
-    _texture_in_place(surfaces, hits, points_world_m, pixel_m, albedo)
-    up = (0.5 + 0.5 * normal[:, 2:3]) * reach[:, 1:2]
-    light = lights.ground * reach[:, 1:2] + (lights.sky - lights.ground) * up
+    albedo = rows(surfaces.albedo, geom)
+    albedo *= _texture_factor(surfaces, hits, points_world_m, pixel_m)
+    open_ = reach[:, 1]
+    up = (normal[:, 2] * np.float32(0.5) + np.float32(0.5)) * open_
+    light = lights.ground * (open_ - up)[:, None] + lights.sky * up[:, None]
     towards, strength = _arriving(lights.key, points_world_m, normal)
     light += lights.key.colour * (strength * reach[:, 0])[:, None]
     for lamp in lights.fill:
         _, more = _arriving(lamp, points_world_m, normal)
-        light += lamp.colour * (more * (0.35 + 0.65 * reach[:, 1]))[:, None]
+        light += lamp.colour * (more * (0.35 + 0.65 * open_))[:, None]
     colour = albedo * light
-    shiny = np.flatnonzero(surfaces.shine[geom, 0] > 0.06)
-    if shiny.size:
-        view = -directions[shiny]
-        view /= np.sqrt(np.einsum("ij,ij->i", view, view))[:, None]
-        colour[shiny] += _gloss(
-            surfaces.shine[geom[shiny]], lights, normal[shiny], view,
-            towards[shiny], reach[shiny], albedo[shiny], geom[shiny], surfaces.kind,
-        )  # fmt: skip
-    emission = surfaces.emission[geom]
+    glint, mirror = _gloss(surfaces, geom, normal, directions, towards, reach)
+    if glint.any() or mirror.any():
+        metal = rows(surfaces.metal, geom)[:, None]
+        tint = 1 + metal * (albedo - 1)
+        colour += (glint[:, None] * lights.key.colour + mirror[:, None]) * tint
+    emission = rows(surfaces.emission, geom)
     if emission.any():
         colour += albedo * (_GLOW * emission)[:, None]
         colour += (0.12 * emission)[:, None]
     colour = soft_clip(colour)
-    colour[geom < 0] = np.array(_BACKGROUND, np.float32)
+    missed = np.flatnonzero(geom < 0)
+    if missed.size:
+        colour[missed] = np.array(_BACKGROUND, np.float32)
     return colour
 
 
@@ -122,12 +129,12 @@ def _arriving(light: Light, points: Float, normal: Float) -> tuple[Float, Float]
     """Unit directions to the light and the cosine-weighted strength that arrives."""
     if light.directional:
         towards = np.broadcast_to(-light.direction, points.shape)
-        cosine = np.einsum("ij,ij->i", normal, towards)
+        cosine = dot(normal, towards)
         return towards, np.maximum(cosine, 0).astype(np.float32)
     towards = light.position_world_m - points
-    distance = np.sqrt(np.einsum("ij,ij->i", towards, towards))
-    towards = towards / np.maximum(distance, 1e-6)[:, None]
-    strength = np.maximum(np.einsum("ij,ij->i", normal, towards), 0)
+    distance = norm(towards)
+    towards /= np.maximum(distance, 1e-6)[:, None]
+    strength = np.maximum(dot(normal, towards), 0)
     c, linear, square = light.attenuation
     if linear or square or c != 1.0:
         strength = strength / np.maximum(c + distance * (linear + square * distance), 1e-3)
@@ -138,51 +145,51 @@ def _arriving(light: Light, points: Float, normal: Float) -> tuple[Float, Float]
 
 
 def _gloss(
-    shine: Float,
-    lights: Lights,
-    normal: Float,
-    view: Float,
-    towards: Float,
-    reach: Float,
-    albedo: Float,
-    geom: Int,
-    kind: Int,
-) -> Float:
+    surfaces: Surfaces, geom: Int, normal: Float, directions: Float, towards: Float, reach: Float
+) -> tuple[Float, Float]:
     """Highlight of the key light and a blurred reflection of a bright ceiling and dark floor."""
-    half = view + towards
-    half /= np.sqrt(np.einsum("ij,ij->i", half, half))[:, None] + 1e-6
-    peak = np.maximum(np.einsum("ij,ij->i", half, normal), 0) ** shine[:, 1]
-    cosine = np.maximum(np.einsum("ij,ij->i", view, normal), 0)
-    fresnel = 0.04 + 0.96 * (1 - cosine) ** 5
-    rising = 2 * cosine * normal[:, 2] - view[:, 2]
-    room = 0.18 + 0.75 * np.clip(0.45 + 0.75 * rising, 0, 1) ** 2
-    metal = kind[geom] == TEXTURES.index("metal")
-    mirror = np.where(metal, shine[:, 2], shine[:, 2] + 0.5 * fresnel * (shine[:, 2] > 0))
-    tint = np.where(metal[:, None], albedo, np.float32(1.0))
-    glint = (shine[:, 0] * peak * reach[:, 0])[:, None] * lights.key.colour
-    glow = (mirror * room * (0.3 + 0.7 * reach[:, 1]))[:, None]
-    return np.asarray(glint * (0.4 + 0.6 * tint) + glow * tint, dtype=np.float32)
+    glint, mirror = np.zeros(len(geom), np.float32), np.zeros(len(geom), np.float32)
+    some = np.flatnonzero(rows(surfaces.shine[:, 0] > 0.06, geom) & (geom >= 0))
+    if not some.size:
+        return glint, mirror
+    shine, metal = rows(surfaces.shine, geom[some]), rows(surfaces.metal, geom[some])
+    facing, light = rows(normal, some), rows(reach, some)
+    view = -rows(directions, some)
+    view /= norm(view)[:, None]
+    half = view + rows(towards, some)
+    half /= (norm(half) + np.float32(1e-6))[:, None]
+    peak = np.maximum(dot(half, facing), 0) ** shine[:, 1]
+    glint[some] = shine[:, 0] * peak * light[:, 0]
+    cosine = np.maximum(dot(view, facing), 0)
+    grazing = (1 - cosine) * (1 - cosine)
+    fresnel = (0.04 + 0.96 * grazing * grazing) * (shine[:, 2] > 0) * (1 - metal)
+    rising = 2 * cosine * facing[:, 2] - view[:, 2]
+    bright = np.clip(0.45 + 0.75 * rising, 0, 1)
+    room = (0.18 + 0.75 * bright * bright) * (0.3 + 0.7 * light[:, 1])
+    mirror[some] = (shine[:, 2] + 0.5 * fresnel) * room
+    return glint, mirror
 
 
-def _texture_in_place(
-    surfaces: Surfaces, hits: Hits, points: Float, pixel_m: float, albedo: Float
-) -> None:
-    kinds = surfaces.kind[hits.geom]
+def _texture_factor(surfaces: Surfaces, hits: Hits, points: Float, pixel_m: float) -> Float:
+    """(n, 3) what the colours of the geoms are multiplied with."""
+    kinds = rows(surfaces.kind, hits.geom)
     kinds[hits.geom < 0] = -1
     textured = np.flatnonzero(kinds >= 0)
-    if not textured.size:
-        return
-    geom = hits.geom[textured]
-    rotation = surfaces.rotation[geom]
-    local = np.einsum("nij,ni->nj", rotation, points[textured] - surfaces.position[geom])
-    across = np.abs(np.einsum("nij,ni->nj", rotation, hits.normal[textured]))
-    uv = face_coordinates(local, across, surfaces.axes[geom])
-    uv += ((geom * 37 % 64)[:, None] * np.array([0.113, 0.071])).astype(np.float32)
-    footprint = hits.distance[textured] * np.float32(pixel_m)
-    kinds = kinds[textured]
-    for kind in np.unique(kinds):
-        some = np.flatnonzero(kinds == kind)
-        albedo[textured[some]] *= texture(TEXTURES[kind]).sample(uv[some], footprint[some])
+    deviation = np.zeros(len(kinds), np.float32)
+    if textured.size:
+        geom = rows(hits.geom, textured)
+        rotation = rows(surfaces.rotation, geom)
+        local = rotated_back(rotation, rows(points, textured) - rows(surfaces.position, geom))
+        across = np.abs(rotated_back(rotation, rows(hits.normal, textured)))
+        uv = face_coordinates(local, across, rows(surfaces.axes, geom))
+        uv += rows(_SHIFT_M, geom % len(_SHIFT_M))
+        footprint = rows(hits.distance, textured) * np.float32(pixel_m)
+        kind_here = rows(kinds, textured)
+        for kind in np.unique(kind_here):
+            some = np.flatnonzero(kind_here == kind)
+            tone = texture(TEXTURES[kind]).sample(rows(uv, some), rows(footprint, some))
+            deviation[rows(textured, some)] = tone - 1
+    return np.asarray(1 + deviation[:, None] * rows(_TINTS, kinds))
 
 
 def face_coordinates(local_m: Float, across: Float, axes: Int) -> Float:
@@ -193,19 +200,20 @@ def face_coordinates(local_m: Float, across: Float, axes: Int) -> Float:
         across: (n, 3) absolute components of the normal there.
         axes: (n, 3) the geom's axes by falling extent.
     """
-    row = np.arange(len(local_m))
-    normal_axis = across.argmax(axis=1)
+    x, y, z = across[:, 0], across[:, 1], across[:, 2]
+    normal_axis = np.where(x >= y, np.where(x >= z, 0, 2), np.where(y >= z, 1, 2))
     first = np.where(axes[:, 0] == normal_axis, axes[:, 1], axes[:, 0])
     second = 3 - normal_axis - first
-    return np.stack([local_m[row, first], local_m[row, second]], axis=1)
+    start = 3 * np.arange(len(local_m))
+    flat = local_m.ravel()
+    return np.stack([flat.take(start + first), flat.take(start + second)], axis=1)
 
 
 def soft_clip(colour: Float) -> Float:
     """Compresses what is brighter than 0.6 so that nothing burns out."""
     knee = np.float32(0.6)
     over = np.maximum(colour - knee, 0)
-    room = 1 - knee
-    return np.asarray(np.minimum(colour, knee) + room * (over / (over + room)), dtype=np.float32)
+    return np.asarray(np.minimum(colour, knee) + (1 - knee) * over / (over + (1 - knee)))
 
 
 _TO_DISPLAY = np.round(255 * np.linspace(0, 1, _GAMMA_STEPS) ** (1 / 2.2)).astype(np.uint8)

@@ -1,7 +1,7 @@
 """Procedural textures: small tileable pictures made once from hashed value noise, with mipmaps.
 
-A texture is a factor on the colour of its geom (mean near 1), so that colours stay those of the
-scene. It is laid on each face along the two axes of the geom that lie in it.
+A texture is a tone that multiplies the colour of its geom (mean near 1), so that colours stay those
+of the scene. It is laid on each face along the two axes of the geom that lie in it.
 """
 
 from __future__ import annotations
@@ -26,38 +26,37 @@ class Texture:
 
     Attributes:
         extent_m: length of one tile's side.
-        texels: (sum of all levels, 3) float32 factors, level after level, row-major.
+        texels: (sum of all levels,) float32 tones, level after level, row-major.
         offsets: where each level begins in `texels`.
         sizes: side of each level in texels.
     """
 
     extent_m: float
     texels: Float
-    offsets: npt.NDArray[np.int64]
-    sizes: npt.NDArray[np.int64]
+    offsets: npt.NDArray[np.int32]
+    sizes: npt.NDArray[np.int32]
 
     def sample(self, uv_m: Float, footprint_m: Float) -> Float:
-        """Bilinear factors (n, 3) at (n, 2) metres; `footprint_m` (n,) chooses the mipmap."""
+        """Bilinear tones (n,) at (n, 2) metres; `footprint_m` (n,) chooses the mipmap."""
         finest = self.extent_m / SIZE
-        level = np.log2(np.maximum(footprint_m / finest, 1.0)).astype(np.int64)
+        level = np.log2(np.maximum(footprint_m / np.float32(finest), 1)).astype(np.int32)
         level = np.minimum(level, len(self.sizes) - 1)
         size, offset = self.sizes[level], self.offsets[level]
-        at = uv_m * (size / self.extent_m).astype(np.float32)[:, None] - 0.5
-        base = np.floor(at)
-        fraction = (at - base).astype(np.float32)
-        low = base.astype(np.int64) & (size - 1)[:, None]
-        high = (low + 1) & (size - 1)[:, None]
-        fx, fy = fraction[:, :1], fraction[:, 1:]
-        rows = offset + low[:, 1] * size, offset + high[:, 1] * size
-        top = self._mix(rows[0] + low[:, 0], rows[0] + high[:, 0], fx)
-        bottom = self._mix(rows[1] + low[:, 0], rows[1] + high[:, 0], fx)
-        return np.asarray(top + (bottom - top) * fy)
+        scale = (size / np.float32(self.extent_m)).astype(np.float32)
+        x, y = uv_m[:, 0] * scale - np.float32(0.5), uv_m[:, 1] * scale - np.float32(0.5)
+        left, top = np.floor(x), np.floor(y)
+        fraction_x, fraction_y = x - left, y - top
+        wrap = size - 1
+        x0, y0 = left.astype(np.int32) & wrap, top.astype(np.int32) & wrap
+        x1, y1 = (x0 + 1) & wrap, offset + ((y0 + 1) & wrap) * size
+        y0 = offset + y0 * size
+        upper = _between(self.texels.take(y0 + x0), self.texels.take(y0 + x1), fraction_x)
+        lower = _between(self.texels.take(y1 + x0), self.texels.take(y1 + x1), fraction_x)
+        return _between(upper, lower, fraction_y)
 
-    def _mix(
-        self, left: npt.NDArray[np.int64], right: npt.NDArray[np.int64], weight: Float
-    ) -> Float:
-        a = self.texels[left]
-        return np.asarray(a + (self.texels[right] - a) * weight)
+
+def _between(a: Float, b: Float, weight: Float) -> Float:
+    return np.asarray(a + (b - a) * weight)
 
 
 def hashed(cells: npt.NDArray[np.int64], seed: int) -> Float:
@@ -103,7 +102,7 @@ def _wood() -> Float:
     grain = fractal_noise(4, 128, 2, 12)
     pores = np.clip((value_noise(24, 256, 14) - 0.78) * 4, 0, 1)
     tone = 1.0 + 0.20 * (rings**2 - 0.4) + 0.26 * (grain - 0.5) - 0.16 * pores
-    return _tinted(tone, (0.92, 1.0, 1.12))
+    return np.asarray(tone, dtype=np.float32)
 
 
 def _tiles() -> Float:
@@ -114,7 +113,7 @@ def _tiles() -> Float:
     shade = hashed(cell[:, None] * count + cell[None, :], 21) - 0.5
     tone = 1.02 + 0.06 * shade + 0.05 * (fractal_noise(16, 16, 4, 22) - 0.5)
     tone = np.where(inside[:, None] & inside[None, :], tone, 0.62)
-    return _tinted(tone, (1.0, 1.0, 1.0))
+    return np.asarray(tone, dtype=np.float32)
 
 
 def _stone() -> Float:
@@ -122,18 +121,20 @@ def _stone() -> Float:
     dark = np.clip((value_noise(128, 128, 32) - 0.72) * 5, 0, 1)
     light = np.clip((value_noise(96, 96, 33) - 0.78) * 5, 0, 1)
     tone = 1.0 + 0.22 * clouds - 0.32 * dark + 0.28 * light
-    return _tinted(tone, (0.97, 1.0, 1.05))
+    return np.asarray(tone, dtype=np.float32)
 
 
 def _plaster() -> Float:
-    tone = 1.0 + 0.05 * (fractal_noise(4, 4, 3, 41) - 0.5) + 0.07 * (value_noise(192, 192, 42) - 0.5)
-    return _tinted(tone, (1.0, 1.0, 1.0))
+    tone = (
+        1.0 + 0.05 * (fractal_noise(4, 4, 3, 41) - 0.5) + 0.07 * (value_noise(192, 192, 42) - 0.5)
+    )
+    return np.asarray(tone, dtype=np.float32)
 
 
 def _metal() -> Float:
     brushed = fractal_noise(6, 256, 2, 51) - 0.5
     tone = 1.0 + 0.20 * brushed + 0.10 * (fractal_noise(2, 4, 2, 52) - 0.5)
-    return _tinted(tone, (1.0, 1.0, 1.0))
+    return np.asarray(tone, dtype=np.float32)
 
 
 def _fabric() -> Float:
@@ -142,23 +143,17 @@ def _fabric() -> Float:
     over = ((pixel[:, None] // 8 + pixel[None, :] // 8) % 2).astype(np.float32)
     weave = over * thread[:, None] + (1 - over) * thread[None, :]
     tone = 0.88 + 0.24 * weave + 0.16 * (fractal_noise(32, 32, 2, 61) - 0.5)
-    return _tinted(tone, (1.0, 1.0, 1.0))
+    return np.asarray(tone, dtype=np.float32)
 
 
 def _food() -> Float:
     mottle = fractal_noise(12, 12, 3, 71) - 0.5
     spots = np.clip((value_noise(56, 56, 72) - 0.75) * 5, 0, 1)
-    return _tinted(1.02 + 0.36 * mottle - 0.22 * spots, (0.9, 1.0, 1.15))
+    return np.asarray(1.02 + 0.36 * mottle - 0.22 * spots, dtype=np.float32)
 
 
 def _ceramic() -> Float:
-    return _tinted(1.0 + 0.04 * (fractal_noise(6, 6, 3, 81) - 0.5), (1.0, 1.0, 1.0))
-
-
-def _tinted(tone: npt.NDArray[np.floating], strength: tuple[float, float, float]) -> Float:
-    """Colour factors whose deviation from 1 is stronger or weaker in each channel."""
-    deviation = np.asarray(tone, np.float32)[..., None] - 1.0
-    return np.asarray(np.clip(1.0 + deviation * np.array(strength, np.float32), 0.05, 2.0))
+    return np.asarray(1.0 + 0.04 * (fractal_noise(6, 6, 3, 81) - 0.5), dtype=np.float32)
 
 
 _MAKERS: dict[str, tuple[Callable[[], Float], float]] = {
@@ -173,16 +168,25 @@ _MAKERS: dict[str, tuple[Callable[[], Float], float]] = {
 }
 
 
+TINTS: dict[str, tuple[float, float, float]] = {
+    name: {"wood": (0.92, 1.0, 1.12), "stone": (0.97, 1.0, 1.05), "food": (0.9, 1.0, 1.15)}.get(
+        name, (1.0, 1.0, 1.0)
+    )
+    for name in TEXTURES
+}
+"""How strongly each colour channel follows the tone."""
+
+
 @lru_cache(maxsize=len(TEXTURES))
 def texture(name: str) -> Texture:
     """The texture of that name (one of `appearance.TEXTURES`)."""
     make, extent_m = _MAKERS[name]
-    levels = [make().astype(np.float32)]
+    levels = [np.clip(make(), 0.1, 1.9).astype(np.float32)]
     while levels[-1].shape[0] > 1:
         fine = levels[-1]
         half = fine.shape[0] // 2
-        levels.append(fine.reshape(half, 2, half, 2, 3).mean(axis=(1, 3), dtype=np.float32))
-    sizes = np.array([level.shape[0] for level in levels], dtype=np.int64)
-    offsets = np.concatenate([[0], np.cumsum(sizes**2)[:-1]])
-    texels = np.concatenate([level.reshape(-1, 3) for level in levels])
+        levels.append(fine.reshape(half, 2, half, 2).mean(axis=(1, 3), dtype=np.float32))
+    sizes = np.array([level.shape[0] for level in levels], dtype=np.int32)
+    offsets = np.concatenate([[0], np.cumsum(sizes**2)[:-1]]).astype(np.int32)
+    texels = np.concatenate([level.ravel() for level in levels])
     return Texture(extent_m, texels, offsets, sizes)

@@ -12,6 +12,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from forestall.envs.kitchen.rendering.vectors import dot
+
 Float = npt.NDArray[np.float32]
 Int = npt.NDArray[np.int32]
 Bool = npt.NDArray[np.bool_]
@@ -74,6 +76,5 @@ def drawn(model: mujoco.MjModel) -> Bool:
 
 def facing(normal: Float, directions: Float) -> Float:
     """Normals turned against the rays that hit them."""
-    away = np.einsum("ij,ij->i", normal, directions) > 0
-    normal[away] *= -1
-    return normal
+    sign = np.where(dot(normal, directions) > 0, np.float32(-1), np.float32(1))
+    return np.asarray(normal * sign[:, None])

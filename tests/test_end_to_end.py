@@ -1,0 +1,100 @@
+"""The real thing: pictures of the embedded kitchen, perception, memory, the command line.
+
+One memory is recorded once and shared by the workers of a test run.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from forestall.cli.main import call
+from forestall.memory.store import open_store
+from forestall.report.record import read_record
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="session")
+def memory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four demonstrations of heat-potato, recorded by the command."""
+    shared = tmp_path_factory.getbasetemp()
+    if os.environ.get("PYTEST_XDIST_WORKER"):
+        shared = shared.parent
+    path, lock = shared / "heat-potato.db", shared / "heat-potato.lock"
+    try:
+        lock.touch(exist_ok=False)
+    except FileExistsError:
+        deadline = time.monotonic() + 600
+        while not path.exists() and time.monotonic() < deadline:
+            time.sleep(0.5)
+        return path
+    partial = shared / "recording.db"
+    arguments = ["demos", "record", str(partial), "--task", "heat-potato", "--quiet"]
+    assert call(arguments) == 0
+    partial.rename(path)
+    return path
+
+
+def test_the_main_job(memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["run", "heat-potato", "--scenario", "microwave-occupied", "--seed", "11"]
+    options = ["--memory", str(memory), "--out", str(tmp_path / "run"), "--json", "--quiet"]
+    assert call([*arguments, *options]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["success"] is True
+    assert data["perception"]["state_estimator"] == "oracle states"
+    assert data["replans"] >= 1
+    alarm = next(a for a in data["alarms"] if a["must_change"])
+    assert "Bowl-1" in alarm["cause"]
+    assert alarm["score"] < alarm["threshold"]
+    executed = [e["subtask"] for e in data["executed"]]
+    assert executed.index("pick_up(Bowl-1)") < executed.index("put_in(Plate-1, Microwave-1)")
+    assert all(e["status"] == "succeeded" for e in data["executed"])
+    assert {"observe", "perceive", "compare", "replan"} <= set(data["compute_s"])
+    page = Path(data["page"]).read_text(encoding="utf-8")
+    assert "Bowl-1" in page and "<svg" in page and "data:image/" in page
+    assert read_record(tmp_path / "run" / "record.json")["success"] is True
+
+
+def test_without_replanning_the_same_scene_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["run", "heat-potato", "--scenario", "microwave-occupied", "--seed", "11"]
+    options = ["--strategy", "none", "--out", str(tmp_path), "--json", "--quiet"]
+    assert call([*arguments, *options]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert data["success"] is False and data["failures"] and data["replans"] == 0
+
+
+def test_an_undisturbed_run_is_left_alone(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["run", "heat-potato", "--seed", "12", "--memory", str(memory)]
+    assert call([*arguments, "--out", str(tmp_path), "--json", "--quiet"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["success"] is True
+    assert data["executed"][-1]["subtask"] == "toggle_on(Microwave-1)"
+
+
+def test_a_killed_run_leaves_memory_and_record_readable(memory: Path, tmp_path: Path) -> None:
+    before = open_store(memory).digest()
+    command = [sys.executable, "-m", "forestall", "run", "heat-potato", "--seed", "13"]
+    options = ["--memory", str(memory), "--out", str(tmp_path / "run"), "--quiet"]
+    process = subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL)
+    lines = tmp_path / "run" / "boundaries.jsonl"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        if lines.exists() and lines.read_text().count("\n") >= 3:
+            break
+        time.sleep(0.2)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert open_store(memory).digest() == before
+    record = read_record(lines)
+    assert record["complete"] is False
+    assert len(record["boundaries"]) >= 1
