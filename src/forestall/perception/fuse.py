@@ -219,7 +219,8 @@ class SceneMemory:
                 if t.points_world_m is not None
             ]
         )
-        subjects = seen - {self._held}
+        homeless = {n for n, t in self.tracks.items() if t.parent is None and n not in seen}
+        subjects = (seen | homeless) - {self._held}
         found = parents(stack, subjects, self._vocabulary, self._config)
         for name in sorted(subjects):
             track = self.tracks[name]

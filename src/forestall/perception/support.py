@@ -2,7 +2,8 @@
 
 The vocabulary says which of the two relations a receptacle offers and what it accepts; points say
 whether it holds. Support is a surface found right below and around an object (which hides what is
-under it), containment is walls found around it. Both use only what is visible of the receptacle.
+under it) or, where others hide that too, the top of something it stands over. Containment is walls
+found around it. Both use only what is visible of the receptacle.
 Called by `fuse.py`.
 """
 
@@ -66,11 +67,14 @@ def _parent(
                 holding.append((float(area[r]), predicate, r))
             continue
         contacts = _contacts(stack, a, r, bottom, config)
-        if contacts >= config.min_contacts:
-            if share[r] >= config.on_top_share or _covers(stack, a, r, config):
-                holding.append((float(area[r]), predicate, r))
-            else:
-                touching.append((-float(contacts), predicate, r))
+        over_it = share[r] >= config.on_top_share
+        level = abs(float(stack.high_m[r, 2]) - bottom) <= config.contact_below_m
+        if contacts >= config.min_contacts and (over_it or _covers(stack, a, r, config)):
+            holding.append((float(area[r]), predicate, r))
+        elif contacts >= config.min_contacts:
+            touching.append((-float(contacts), predicate, r))
+        elif over_it and level:
+            touching.append((0.0, predicate, r))
     if not holding and not touching:
         return None
     _, predicate, r = min(holding or touching)

@@ -155,12 +155,14 @@ class Drawing:
 
     def _said(self, node: ObjectNode) -> frozenset[str]:
         """Attributes that a discrepancy names as changed on this node."""
-        own = self._partner(node.id)
-        names = {node.id} if own is None else {node.id, own.id}
+        partner = self._partner(node.id)
+        if partner is None:
+            return frozenset()
+        observed = node.id if self.me.name == "observed" else partner.id
         texts = [
             f"{d.text} {d.expected} {d.observed}"
             for d in self.said
-            if d.change is Change.STATE and d.subject in names
+            if d.change is Change.STATE and d.subject == observed
         ]
         return frozenset(a for a, v in node.states if v and any(f"{a}=" in t for t in texts))
 

@@ -101,8 +101,7 @@ def sides(
     pairs = {e: o for o, e in matches if observed.get(o) and expected.get(e)}
     if not pairs:
         pairs = {n.id: n.id for n in expected.nodes if n.id in ids}
-    if expected.get(GRIPPER) and observed.get(GRIPPER):
-        pairs[GRIPPER] = GRIPPER
+    pairs[GRIPPER] = GRIPPER
     common = {n.id: pairs.get(n.id, f"{n.id} (expected)") for n in expected.nodes}
     return left, Side("expected", expected, common, _parents(expected))
 

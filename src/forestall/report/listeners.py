@@ -12,6 +12,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.live import Live
 from rich.markup import escape
+from rich.text import Text
 
 from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.plan import Plan, Subtask
@@ -78,10 +79,10 @@ class ProgressLine:
             self._alarms += 1
             cause = "" if answer.diagnosis is None else f": {answer.diagnosis.cause}"
             self._say(f"alarm before {context.subtask}{cause}", "yellow")
-        if answer.decision is Decision.REPLAN and answer.replan is not None:
-            if answer.replan.plan is not None:
-                remaining = len(answer.replan.plan)
-                self._say(f"new plan: {remaining} subtasks", "cyan")
+        plan = None if answer.replan is None else answer.replan.plan
+        if answer.decision is Decision.REPLAN and plan is not None:
+            remaining = len(plan)
+            self._say(f"new plan: {remaining} subtasks", "cyan")
         if answer.decision is Decision.STOP:
             self._say(f"stopped before {context.subtask}: {answer.why}", "red")
         self._total = self._done + remaining
@@ -128,17 +129,18 @@ class ProgressLine:
     def _count(self) -> str:
         return f"{self._alarms} alarm{'s' * (self._alarms != 1)}"
 
-    def _line(self) -> str:
+    def _line(self) -> Text:
         elapsed = self._clock() - self._started
         left = ""
         if self._done:
             ahead = max(0, self._total - self._done)
             left = f", about {elapsed / self._done * ahead:.0f} s left"
-        return (
+        return Text.from_markup(
             f"[bold]{escape(self._task)}[/] "
             f"{min(self._done + 1, max(1, self._total))}/{max(1, self._total)} "
             f"[cyan]{escape(self._now)}[/] · {self._simulated_s:.0f} s simulated · "
-            f"{self._count()} · {elapsed:.0f} s elapsed{left}"
+            f"{self._count()} · {elapsed:.0f} s elapsed{left}",
+            overflow="ellipsis",
         )
 
     def _say(self, text: str, style: str = "") -> None:

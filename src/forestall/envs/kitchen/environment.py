@@ -179,7 +179,7 @@ class KitchenEnvironment:
             return self._observation([self._frame(world.camera_to_world(0.0, AHEAD_TILT_RAD))])
         eye = world.look_at(focus[0])[:3, 3]
         aims = _aims(np.asarray(focus, dtype=float) - eye)
-        return self._observation([self._frame(world.look_at(eye + aim)) for aim in aims])
+        return self._observation([self._frame(world.look_at((eye + aim).tolist())) for aim in aims])
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from forestall.envs.kitchen.rendering.appearance import Appearance
 from forestall.envs.kitchen.rendering.lighting import (
+    GROUPS,
     STRIDE,
     Lights,
     block_group,
@@ -35,6 +36,9 @@ from forestall.types.observation import Frame, Intrinsics
 
 BAND_ROWS = 48
 CHUNK = 16384
+OWN_GROUP_STEP = 2
+"""Of the sample groups, every how-manieth a point without neighbours on the grid uses."""
+
 LAYERS = 3
 """How many transparent surfaces a ray passes at most."""
 
@@ -241,12 +245,16 @@ class RayRenderer:
         reach = total / np.maximum(weights, 1e-6)[:, None]
         lost = np.flatnonzero((weights < 0.005) & (hits.geom >= 0))
         if lost.size:
-            pixel = np.round(at[lost]).astype(np.int32)
-            group = block_group(pixel[:, 1], pixel[:, 0])
-            reach[lost] = visibility(
-                self._tracer, lights.key, points[lost], hits.normal[lost], group
-            )
+            reach[lost] = self._own_reach(lights, rows(points, lost), rows(hits.normal, lost))
         return np.asarray(reach)
+
+    def _own_reach(self, lights: Lights, points: Float, normals: Float) -> Float:
+        """Light reach from the points' own rays, as many as the filter over the grid combines."""
+        total = np.zeros((len(points), 2), np.float32)
+        for group in range(0, GROUPS, OWN_GROUP_STEP):
+            groups = np.full(len(points), group, np.int32)
+            total += visibility(self._tracer, lights.key, points, normals, groups)
+        return np.asarray(total / (GROUPS // OWN_GROUP_STEP))
 
     def _layered(
         self,
@@ -269,7 +277,7 @@ class RayRenderer:
             place = start + along * behind.distance[:, None]
             depth = hits.distance[clear] + behind.distance
             behind = Hits(behind.geom, depth, behind.normal)
-            light = np.tile(np.array([[0.8, 0.8]], np.float32), (clear.size, 1))
+            light = np.full((clear.size, 2), 0.8, np.float32)
             through = self._layered(view, lights, behind, place, along, light, layers - 1)
             cover = alpha[clear, None]
             colour[clear] = cover * colour[clear] + (1 - cover) * through

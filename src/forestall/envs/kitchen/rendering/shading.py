@@ -27,6 +27,8 @@ _SHINE: dict[str | None, tuple[float, float, float]] = {
 }
 _BACKGROUND = (0.55, 0.62, 0.70)
 _GLOW = 2.2
+_LEAST_AMBIENT = np.float32(0.2)
+"""Share of the ambient that reaches even the tightest corner."""
 _GAMMA_STEPS = 1 << 14
 _TINTS = np.array([*(TINTS[name] for name in TEXTURES), (1.0, 1.0, 1.0)], np.float32)
 _SHIFT_M = np.stack([0.113 * np.arange(64), 0.071 * (37 * np.arange(64) % 64)], 1).astype(
@@ -100,11 +102,11 @@ def shade(
     geom, normal = hits.geom, hits.normal
     albedo = rows(surfaces.albedo, geom)
     albedo *= _texture_factor(surfaces, hits, points_world_m, pixel_m)
-    open_ = reach[:, 1]
+    open_ = _LEAST_AMBIENT + (1 - _LEAST_AMBIENT) * reach[:, 1]
     up = (normal[:, 2] * np.float32(0.5) + np.float32(0.5)) * open_
     light = lights.ground * (open_ - up)[:, None] + lights.sky * up[:, None]
     towards, strength = _arriving(lights.key, points_world_m, normal)
-    light += lights.key.colour * (strength * reach[:, 0])[:, None]
+    light += lights.key.colour * (strength * reach[:, 0] * (0.7 + 0.3 * open_))[:, None]
     for lamp in lights.fill:
         _, more = _arriving(lamp, points_world_m, normal)
         light += lamp.colour * (more * (0.35 + 0.65 * open_))[:, None]

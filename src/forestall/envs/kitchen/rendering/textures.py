@@ -126,7 +126,7 @@ def _stone() -> Float:
 
 def _plaster() -> Float:
     tone = (
-        1.0 + 0.05 * (fractal_noise(4, 4, 3, 41) - 0.5) + 0.07 * (value_noise(192, 192, 42) - 0.5)
+        1.0 + 0.06 * (fractal_noise(4, 4, 3, 41) - 0.5) + 0.10 * (value_noise(192, 192, 42) - 0.5)
     )
     return np.asarray(tone, dtype=np.float32)
 

@@ -1,0 +1,58 @@
+"""The page of a run: one HTML file that needs nothing but itself.
+
+Calls: `write_page` → `page_view.py` (what is shown) → `graph_svg.py`, `pictures.py`; the template
+escapes every text. The same record gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from forestall.report.graph_svg import graph_css
+from forestall.report.page_view import duration, page_view, status_sign
+from forestall.report.record import replace_file
+from forestall.types.episode import EpisodeRecord
+
+
+def page_html(record: EpisodeRecord) -> str:
+    """The page of a finished run as text."""
+    environment = Environment(
+        loader=PackageLoader("forestall.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["duration"] = duration
+    environment.filters["sign"] = status_sign
+    environment.filters["svg"] = Markup  # graph_svg escapes its own texts
+    folder = files("forestall.report").joinpath("templates")
+    style = folder.joinpath("page.css").read_text(encoding="utf-8")
+    script = folder.joinpath("page.js").read_text(encoding="utf-8")
+    return environment.get_template("page.html.jinja").render(
+        page=page_view(record),
+        record=record,
+        style=Markup(style + graph_css()),
+        script=Markup(script),
+    )
+
+
+def write_page(record: EpisodeRecord, path: Path | str) -> Path:
+    """Write the page of a finished run.
+
+    Args:
+        record: pictures come from its observations; where there are none the page says so.
+        path: the HTML file; its folder is made when it is not there.
+
+    Returns:
+        The path.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(path, page_html(record).encode("utf-8"))
+    return path

@@ -1,0 +1,253 @@
+"""What the page shows, as plain values for the template; called by `page.py` only."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from forestall.report.as_json import plain
+from forestall.report.derived import (
+    Alarm,
+    Mark,
+    Moment,
+    PlanRow,
+    alarms,
+    cause_of,
+    computed_s,
+    done_before,
+    moments,
+    outcome_of,
+    plan_rows,
+    provenance_of,
+)
+from forestall.report.graph_svg import graph_svg
+from forestall.report.pictures import Picture, page_picture
+from forestall.types.episode import EpisodeRecord, SkillStatus
+from forestall.types.observation import Observation
+from forestall.types.plan import Subtask
+from forestall.types.verdict import Verdict
+
+PICTURE_WIDTH, VIEW_WIDTH, THUMB_WIDTH = 480, 232, 132
+_PICTURES_BYTES = 1_900_000
+_MAX_VIEWS = 3
+
+LOOKS: Mapping[Mark, tuple[str, str]] = {
+    Mark.PROCEEDED: ("go", "✓"),
+    Mark.REPLANNED: ("replanned", "↻"),
+    Mark.DISMISSED: ("dismissed", "◌"),
+    Mark.UNSOLVED: ("unsolved", "!"),
+    Mark.REFUSED: ("refused", "✕"),
+    Mark.FAILED: ("refused", "✕"),
+    Mark.LOOKED: ("looked", "◎"),
+    Mark.STOPPED: ("unsolved", "■"),
+    Mark.UNJUDGED: ("unjudged", "–"),
+}
+"""Mark → its class in the style sheet and its sign (colour alone never tells)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """One number between 0 and `scale` as a bar."""
+
+    label: str
+    value: float | None
+    percent: float
+    strong: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One moment of the run."""
+
+    number: int
+    moment: Moment
+    look: str
+    sign: str
+    verb: str
+    args: str
+    picture: Picture | None
+    views: tuple[Picture, ...]
+    thumb: Picture | None
+    bars: tuple[Bar, ...]
+    threshold_percent: float
+    observed_svg: str
+    expected_svg: str
+    cause: str
+    outcome: str
+    rows: tuple[PlanRow, ...]
+    open: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """The whole page."""
+
+    record: EpisodeRecord
+    cards: tuple[Card, ...]
+    alarms: tuple[Alarm, ...]
+    places: Mapping[int, int]  # position of a boundary → number of its card
+    legend: tuple[tuple[str, str, str, int], ...]  # class, sign, words, how many
+    segmenter: str
+    states: str
+    oracle: bool
+    memory: str
+    computed_s: float
+    phases: tuple[Bar, ...]
+    provenance: tuple[tuple[str, str], ...]
+
+
+def page_view(record: EpisodeRecord) -> Page:
+    """Everything that the template needs."""
+    all_moments = moments(record)
+    frames = sum(
+        1 + 0.3 * min(_MAX_VIEWS, len(m.boundary.observation.frames) - 1)
+        for m in all_moments
+        if m.boundary is not None and m.boundary.observation is not None
+    )
+    budget = int(_PICTURES_BYTES / max(10.0, frames))
+    cards = tuple(_card(record, i, m, budget) for i, m in enumerate(all_moments, 1))
+    perception = provenance_of(record, "perception")
+    states = str(perception.get("state_estimator") or "not recorded")
+    longest = max((s for _, s in record.compute_s), default=0.0) or 1.0
+    return Page(
+        record=record,
+        cards=cards,
+        alarms=alarms(record),
+        places={c.moment.position: c.number for c in cards if c.moment.position is not None},
+        legend=_legend(all_moments),
+        segmenter=str(perception.get("segmenter") or "not recorded"),
+        states=states,
+        oracle="oracle" in states.lower(),
+        memory=_words(dict(record.provenance).get("memory")),
+        computed_s=computed_s(record),
+        phases=tuple(
+            Bar(name, seconds, 100 * seconds / longest)
+            for name, seconds in sorted(record.compute_s, key=lambda x: (-x[1], x[0]))
+        ),
+        provenance=tuple((str(k), _words(v)) for k, v in record.provenance),
+    )
+
+
+def _legend(found: Sequence[Moment]) -> tuple[tuple[str, str, str, int], ...]:
+    counts = {mark: sum(m.mark is mark for m in found) for mark in Mark}
+    return tuple((*LOOKS[mark], mark.value, n) for mark, n in counts.items() if n)
+
+
+def _card(record: EpisodeRecord, number: int, moment: Moment, budget: int) -> Card:
+    look, sign = LOOKS[moment.mark]
+    boundary = moment.boundary
+    verdict = None if boundary is None else boundary.verdict
+    observation = None if boundary is None else boundary.observation
+    picture, views, thumb = _pictures(observation, budget)
+    bars, threshold = _bars(verdict)
+    observed, expected = _graphs(moment)
+    outcome = None if boundary is None else outcome_of(boundary)
+    rows: tuple[PlanRow, ...] = ()
+    if boundary is not None and moment.after is not None:
+        rows = plan_rows(done_before(record, boundary.index), moment.before, moment.after)
+    return Card(
+        number=number,
+        moment=moment,
+        look=look,
+        sign=sign,
+        verb=_verb(moment.subtask),
+        args=" → ".join(moment.subtask.args),
+        picture=picture,
+        views=views,
+        thumb=thumb,
+        bars=bars,
+        threshold_percent=threshold,
+        observed_svg=observed,
+        expected_svg=expected,
+        cause=cause_of(boundary) if boundary is not None and moment.alarm else "",
+        outcome="" if outcome is None else outcome.value,
+        rows=rows,
+        open=moment.alarm or look in ("refused", "replanned", "unsolved"),
+    )
+
+
+def _verb(subtask: Subtask) -> str:
+    return subtask.skill.removesuffix("_obj").replace("_", " ")
+
+
+def _pictures(
+    observation: Observation | None, budget: int
+) -> tuple[Picture | None, tuple[Picture, ...], Picture | None]:
+    if observation is None:
+        return None, (), None
+    *others, newest = observation.frames
+    thumb = page_picture(newest, width=THUMB_WIDTH, budget_bytes=max(3000, budget // 8))
+    picture = page_picture(newest, width=PICTURE_WIDTH, budget_bytes=budget)
+    views = tuple(
+        page_picture(f, width=VIEW_WIDTH, budget_bytes=budget // 4) for f in others[-_MAX_VIEWS:]
+    )
+    return picture, views, thumb
+
+
+def _bars(verdict: Verdict | None) -> tuple[tuple[Bar, ...], float]:
+    if verdict is None or verdict.score is None:
+        return (), 0.0
+    parts = verdict.parts
+    found: list[tuple[str, float | None, bool]] = [("score", verdict.score, True)]
+    if parts is not None:
+        found += [
+            ("nodes", parts.node, False),
+            ("edges", parts.edge, False),
+            ("structure", parts.structure, False),
+        ]
+    scale = max(1.0, verdict.threshold, *(v for _, v, _ in found if v is not None))
+    return (
+        tuple(Bar(n, v, 100 * max(0.0, v or 0.0) / scale, strong) for n, v, strong in found),
+        100 * max(0.0, verdict.threshold) / scale,
+    )
+
+
+def _graphs(moment: Moment) -> tuple[str, str]:
+    boundary = moment.boundary
+    if boundary is None:
+        return "", ""
+    verdict = boundary.verdict
+    if verdict is None or verdict.nearest is None:
+        return graph_svg(boundary.scoped, None, (), (), "observed"), ""
+    seen, wanted = boundary.scoped, verdict.nearest.graph
+    pairs, found = verdict.matches, verdict.discrepancies
+    return (
+        graph_svg(seen, wanted, pairs, found, "observed"),
+        graph_svg(wanted, seen, pairs, found, "expected"),
+    )
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words, with a unit that keeps it short."""
+    if seconds == 0:
+        return "0 s"
+    if abs(seconds) >= 100:
+        return f"{seconds:.0f} s"
+    if abs(seconds) >= 1:
+        return f"{seconds:.1f} s"
+    return f"{1000 * seconds:.0f} ms" if abs(seconds) >= 0.0095 else f"{1000 * seconds:.1f} ms"
+
+
+def status_sign(status: SkillStatus | None) -> str:
+    """The sign of an executed step."""
+    return "✓" if status is SkillStatus.SUCCEEDED else "✕"
+
+
+def _words(value: Any) -> str:
+    """A value of the provenance on one line."""
+    data = plain(value)
+    if data is None:
+        return "none"
+    if isinstance(data, dict):
+        return _joined(f"{k} {_words(v)}" for k, v in data.items())
+    if isinstance(data, list):
+        if all(isinstance(v, list) and len(v) == 2 for v in data):
+            return _joined(f"{k} {_words(v)}" for k, v in data)
+        return _joined(_words(v) for v in data)
+    return data if isinstance(data, str) else json.dumps(data, ensure_ascii=False)
+
+
+def _joined(parts: Iterable[str]) -> str:
+    return ", ".join(parts) or "none"
