@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from forestall.grounding import executable, ground_subtask
@@ -171,7 +171,7 @@ class Runtime:
         """Look towards what the next subtask concerns, perceive, and ask the strategy."""
         before = dict(episode.seconds)
         with episode.phase("observe"):
-            observation = self._environment.observe(self._focus(episode, self._ground(episode)))
+            observation = self._look(episode)
         looks = 1
         while True:
             with episode.phase("perceive"):
@@ -189,7 +189,9 @@ class Runtime:
                 break
             looks += 1
             with episode.phase("observe"):
-                observation = self._environment.scan(thorough=True)
+                around = self._environment.scan(thorough=True)
+                ahead = self._look(episode)
+                observation = replace(ahead, frames=(*around.frames, *ahead.frames))
         self._note(episode, context, answer, before)
         return context, answer
 
@@ -257,15 +259,16 @@ class Runtime:
             episode.bound,
         )
 
-    def _focus(self, episode: _Episode, subtask: Subtask) -> tuple[Vec3, ...]:
-        """World points of the arguments that are somewhere else than in the hand."""
+    def _look(self, episode: _Episode) -> Observation:
+        """Towards the arguments of the next subtask that are somewhere else than in the hand."""
+        subtask = self._ground(episode)
         holding = episode.graph.holding
-        points = []
+        points: list[Vec3] = []
         for name in subtask.args:
             node = episode.graph.get(name)
             if node is not None and node.centroid_m is not None and node.id != holding:
                 points.append(node.centroid_m)
-        return tuple(points)
+        return self._environment.observe(points)
 
     def _context(
         self, episode: _Episode, subtask: Subtask | None, looks: int

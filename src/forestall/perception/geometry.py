@@ -20,6 +20,7 @@ DIRECTIONS: Points = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 """(2, 16) unit vectors of the footprint's sides."""
 
 _SAMPLES = 256
+_OUTLINE = 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,10 +61,9 @@ class Stack:
         if not ordered:
             empty = np.zeros((0, 3))
             return cls((), empty, empty, np.zeros((0, 16)), ())
-        counts = [len(t.points_world_m) for t in ordered]
-        cloud = np.concatenate([t.points_world_m for t in ordered])
-        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-        reach = np.maximum.reduceat(cloud[:, :2] @ DIRECTIONS, starts, axis=0)
+        outlines = [sampled(t.points_world_m, _OUTLINE)[:, :2] for t in ordered]
+        starts = np.concatenate([[0], np.cumsum([len(o) for o in outlines])[:-1]])
+        reach = np.maximum.reduceat(np.concatenate(outlines) @ DIRECTIONS, starts, axis=0)
         return cls(
             things=ordered,
             low_m=np.stack([t.low_m for t in ordered]),

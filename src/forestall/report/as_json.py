@@ -18,9 +18,9 @@ from forestall.report.derived import (
     Alarm,
     Mark,
     alarms,
-    computed_s,
     moments,
     provenance_of,
+    reasoning_s,
     replans,
 )
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, Event, ExecutedRecord
@@ -47,7 +47,7 @@ def record_json(
         Only dict, list, str, int, float, bool and None; a number that is not finite is None.
     """
     perception = provenance_of(record, "perception")
-    computed = computed_s(record)
+    reasoning = reasoning_s(record.compute_s)
     data = {
         "kind": KIND,
         "format": RECORD_FORMAT,
@@ -68,8 +68,9 @@ def record_json(
         "end": record.end,
         "simulated_s": record.simulated_s,
         "compute_s": dict(record.compute_s),
-        "computed_s": computed,
-        "total_s": record.simulated_s + computed,
+        "computed_s": sum(seconds for _, seconds in record.compute_s),
+        "reasoning_s": reasoning,
+        "total_s": record.simulated_s + reasoning,
         "perception": {"segmenter": None, "state_estimator": None, **perception},
         "memory": dict(record.provenance).get("memory"),
         "versions": provenance_of(record, "versions"),

@@ -6,7 +6,7 @@ Pure functions over `types/`; the JSON record and the page both ask here, so tha
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -21,6 +21,9 @@ from forestall.types.facts import category_of
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import Decision, Replan, ReplanOutcome
+
+SIMULATOR_PHASES = frozenset({"act", "observe"})
+"""Measured phases in which the simulator moves and draws; on a robot they are its own time."""
 
 NOTHING_FOUND = "nothing was found that must change"
 
@@ -310,6 +313,6 @@ def provenance_of(record: EpisodeRecord, name: str) -> Mapping[str, Any]:
     return {} if value is None else {name: value}
 
 
-def computed_s(record: EpisodeRecord) -> float:
-    """All measured reasoning time of a run."""
-    return sum(seconds for _, seconds in record.compute_s)
+def reasoning_s(phases: Iterable[tuple[str, float]]) -> float:
+    """Measured time that a robot would spend, too: all phases but those of the simulator."""
+    return sum(seconds for name, seconds in phases if name not in SIMULATOR_PHASES)

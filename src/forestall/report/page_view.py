@@ -9,18 +9,19 @@ from typing import Any
 
 from forestall.report.as_json import plain
 from forestall.report.derived import (
+    SIMULATOR_PHASES,
     Alarm,
     Mark,
     Moment,
     PlanRow,
     alarms,
     cause_of,
-    computed_s,
     done_before,
     moments,
     outcome_of,
     plan_rows,
     provenance_of,
+    reasoning_s,
 )
 from forestall.report.graph_svg import graph_svg
 from forestall.report.pictures import Picture, page_picture
@@ -49,12 +50,13 @@ LOOKS: Mapping[Mark, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """One number between 0 and `scale` as a bar."""
+    """One number as a bar of `percent` of the full length."""
 
     label: str
     value: float | None
     percent: float
     strong: bool = False
+    aside: bool = False  # a phase of the simulator
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,8 @@ class Page:
     states: str
     oracle: bool
     memory: str
-    computed_s: float
+    reasoning_s: float
+    simulator_s: float
     phases: tuple[Bar, ...]
     provenance: tuple[tuple[str, str], ...]
 
@@ -121,9 +124,10 @@ def page_view(record: EpisodeRecord) -> Page:
         states=states,
         oracle="oracle" in states.lower(),
         memory=_words(dict(record.provenance).get("memory")),
-        computed_s=computed_s(record),
+        reasoning_s=reasoning_s(record.compute_s),
+        simulator_s=sum(s for n, s in record.compute_s if n in SIMULATOR_PHASES),
         phases=tuple(
-            Bar(name, seconds, 100 * seconds / longest)
+            Bar(name, seconds, 100 * seconds / longest, aside=name in SIMULATOR_PHASES)
             for name, seconds in sorted(record.compute_s, key=lambda x: (-x[1], x[0]))
         ),
         provenance=tuple((str(k), _words(v)) for k, v in record.provenance),

@@ -24,7 +24,7 @@ from forestall.report.as_json import (
     plain,
     record_json,
 )
-from forestall.report.derived import alarm_at, boundary_of, new_plan
+from forestall.report.derived import alarm_at, boundary_of, new_plan, reasoning_s
 from forestall.report.pictures import encode_jpeg, file_name
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillOutcome
 from forestall.types.plan import Plan, Subtask
@@ -271,7 +271,7 @@ def _unfinished(start: Mapping[str, Any], events: Sequence[Mapping[str, Any]]) -
             compute[phase] = compute.get(phase, 0.0) + seconds
     times = [b["time_s"] for b in boundaries]
     times += [e["time_s"] for e in events if e.get("event") == "executed"]
-    simulated, computed = max(times, default=0.0), sum(compute.values())
+    simulated, reasoning = max(times, default=0.0), reasoning_s(compute.items())
     known = start.get("provenance") or {}
     names = ("task", "title", "goal", "scenario", "strategy", "seed")
     return {
@@ -289,8 +289,9 @@ def _unfinished(start: Mapping[str, Any], events: Sequence[Mapping[str, Any]]) -
         "end": None,
         "simulated_s": simulated,
         "compute_s": compute,
-        "computed_s": computed,
-        "total_s": simulated + computed,
+        "computed_s": sum(compute.values()),
+        "reasoning_s": reasoning,
+        "total_s": simulated + reasoning,
         "perception": {
             "segmenter": None,
             "state_estimator": None,

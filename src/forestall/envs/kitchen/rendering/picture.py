@@ -42,6 +42,9 @@ OWN_GROUP_STEP = 2
 LAYERS = 3
 """How many transparent surfaces a ray passes at most."""
 
+LEAST_CONTRAST = 0.025
+"""Steps of the square root of linear colour that are worth smoothing (full scale is 1)."""
+
 _SUBPIXELS = ((-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125))
 
 
@@ -117,7 +120,7 @@ class RayRenderer:
             edges = discontinuities(geom, normal, depth)
             colour = self._colour(view, lights, hits, points, edges)
         with self._phase("anti-aliasing"):
-            self._smooth_edges(view, lights, colour, edges)
+            self._smooth_edges(view, lights, colour, edges & contrasts(colour))
         with self._phase("display"):
             rgb = to_display(colour)
         return Frame(
@@ -313,6 +316,18 @@ def discontinuities(geom: Int, normal: Float, depth_m: Float) -> Bool:
         edges[first] |= jump
         edges[second] |= jump
     return edges
+
+
+def contrasts(colour: Float) -> Bool:
+    """(h, w) pixels that differ visibly from a neighbour."""
+    tone = np.sqrt(colour)
+    out = np.zeros(colour.shape[:2], dtype=bool)
+    for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        step = np.abs(tone[first] - tone[second]) > LEAST_CONTRAST
+        visible = step[..., 0] | step[..., 1] | step[..., 2]
+        out[first] |= visible
+        out[second] |= visible
+    return out
 
 
 def grown(mask: Bool, by: int) -> Bool:
