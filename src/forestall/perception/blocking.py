@@ -18,6 +18,7 @@ from forestall.perception.support import Parent
 from forestall.perception.unproject import Labels, Points
 from forestall.types.graph import Relation
 from forestall.types.observation import Depth, Vec3
+from forestall.vocabulary import Vocabulary
 
 
 def cuts(
@@ -51,6 +52,7 @@ def blocking(
     parents: Mapping[str, Parent],
     eye_world_m: Vec3,
     cut_share: Mapping[tuple[str, str], float],
+    vocabulary: Vocabulary,
     config: PerceptionConfig,
 ) -> list[Relation]:
     """Every "B blocking A" between things with the same parent.
@@ -60,6 +62,7 @@ def blocking(
         parents: what each thing rests in or on.
         eye_world_m: where the robot looks from.
         cut_share: (nearer, farther) → share of the farther one's outline that is cut off.
+        vocabulary: how tall things are of which only a part shows.
         config: thresholds.
     """
     index = {t.id: i for i, t in enumerate(stack.things)}
@@ -76,7 +79,7 @@ def blocking(
             axes = _opening(stack, index[support], [index[n] for n in names], eye, config)
         else:
             axes = _open_edge(stack, index[support], eye, config)
-        extents = {n: _extent(stack, index[n], axes) for n in names}
+        extents = {n: _extent(stack, index[n], axes, vocabulary) for n in names}
         for target in names:
             if _from_above(stack, index[support], index[target], config):
                 continue
@@ -137,14 +140,15 @@ def _opening(
     return _axes(np.array(min(options)[2]))
 
 
-def _extent(stack: Stack, i: int, axes: Axes) -> tuple[float, float, float, float, float, float]:
+def _extent(stack: Stack, i: int, axes: Axes, vocabulary: Vocabulary) -> tuple[float, ...]:
     """Extent of a thing towards the hand, across, and upwards."""
     local = stack.samples[i][:, :2] @ axes.T
     low, high = local.min(axis=0), local.max(axis=0)
-    return (
-        float(low[0]), float(high[0]), float(low[1]), float(high[1]),
-        float(stack.low_m[i, 2]), float(stack.high_m[i, 2]),
-    )  # fmt: skip
+    foot, top = float(stack.low_m[i, 2]), float(stack.high_m[i, 2])
+    category = vocabulary.find(stack.things[i].category)
+    size = None if category is None else category.shape.get("size_m")
+    tall = top if size is None else max(top, foot + float(size[2]))
+    return (float(low[0]), float(high[0]), float(low[1]), float(high[1]), foot, tall)
 
 
 def _from_above(stack: Stack, support: int, target: int, config: PerceptionConfig) -> bool:
@@ -161,12 +165,15 @@ def _from_above(stack: Stack, support: int, target: int, config: PerceptionConfi
 def _in_the_way(
     target: tuple[float, ...], other: tuple[float, ...], cut: bool, config: PerceptionConfig
 ) -> bool:
-    """Whether `other` stands in the target's corridor towards the hand."""
+    """Whether `other` stands in the target's corridor towards the hand.
+
+    Of a target that the other one cuts off in the image, some is hidden behind it.
+    """
     _, front, left, right, foot, top = target
     back_b, front_b, left_b, right_b, foot_b, top_b = other
     if top_b < foot + config.min_obstacle_m or foot_b >= top:
         return False
     if front_b <= front or back_b >= front + config.corridor_m:
         return False
-    margin = 0.0 if cut else config.corridor_margin * (right - left)
+    margin = -config.cut_slack_m if cut else config.corridor_margin * (right - left)
     return right_b > left + margin and left_b < right - margin

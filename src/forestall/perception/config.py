@@ -54,6 +54,7 @@ class PerceptionConfig:
         min_obstacle_m: how far an obstacle must rise above the target's foot.
         occlusion_share: share of a mask's outline that the nearer mask cuts off (REFLECT asks for
             an image overlap of 0.5 of whole boxes; an outline is evidence of real occlusion).
+        cut_slack_m: how far beside a thing that it cuts off another one may stand and block it.
         depth_edge_m: step of depth at such an outline.
         free_margin_m: how much farther than a remembered point the depth must be to be called
             free space.
@@ -100,6 +101,7 @@ class PerceptionConfig:
     headroom_m: float = 0.1
     min_obstacle_m: float = 0.04
     occlusion_share: float = 0.12
+    cut_slack_m: float = 0.02
     depth_edge_m: float = 0.03
     free_margin_m: float = 0.02
     free_margin_share: float = 0.01

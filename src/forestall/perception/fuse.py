@@ -235,7 +235,8 @@ class SceneMemory:
         tied = [(n, r) for n, (_, r) in links.items()]
         relations += directions(stack, camera, skip, tied, self._config)
         eye = (float(camera[0, 3]), float(camera[1, 3]), float(camera[2, 3]))
-        relations += blocking(stack, links, eye, self._cut_shares(views), self._config)
+        cut = self._cut_shares(views)
+        relations += blocking(stack, links, eye, cut, self._vocabulary, self._config)
         self._relations = relations
 
     def _former_parent(self, track: Track) -> Parent | None:

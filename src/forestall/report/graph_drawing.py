@@ -21,7 +21,7 @@ from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.verdict import Change, Discrepancy
 
 NAME, CHIP, EDGE = 13.0, 11.0, 10.5
-BOX, PITCH, INDENT, MARGIN = 28.0, 40.0, 74.0, 6.0
+BOX, PITCH, INDENT, MARGIN = 28.0, 40.0, 78.0, 6.0
 _LANE_LIMIT = 5
 
 

@@ -11,7 +11,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from forestall.errors import FileFormatError, InputError
 from forestall.report.as_json import (
@@ -63,15 +63,15 @@ class RunRecorder:
         self._strategy = strategy
         self._provenance = dict(provenance or {})
         self._page = page
-        self._lines: TextIO | None = None
+        self._started = False
         self._position = 0
 
     def on_start(self, task: Task, plan: Plan, seed: int) -> None:
         """The episode begins."""
-        self.close()
         self.folder.mkdir(parents=True, exist_ok=True)
         (self.folder / RECORD_NAME).unlink(missing_ok=True)
-        self._lines = (self.folder / LINES_NAME).open("w", encoding="utf-8", newline="\n")
+        (self.folder / LINES_NAME).write_text("", encoding="utf-8")
+        self._started = True
         self._position = 0
         self._write(
             "start",
@@ -115,19 +115,14 @@ class RunRecorder:
         """The episode is over."""
         write_record(self.folder, record, page=self._page)
         self._write("end", end=record.end.value)
-        self.close()
-
-    def close(self) -> None:
-        """Close the file of lines; the run stays readable."""
-        if self._lines is not None:
-            self._lines.close()
-            self._lines = None
 
     def _write(self, what: str, **fields: Any) -> None:
-        if self._lines is None:
+        if not self._started:
             raise InputError("the recorder has not been started: call on_start first")
-        self._lines.write(_dumps({"event": what, **fields}) + "\n")
-        self._lines.flush()
+        # Opened for each line: a run that raises leaves nothing open and nothing unwritten.
+        with (self.folder / LINES_NAME).open("a", encoding="utf-8", newline="\n") as lines:
+            lines.write(_dumps({"event": what, **fields}) + "\n")
+            lines.flush()
 
 
 def write_record(folder: Path | str, record: EpisodeRecord, *, page: str | None = None) -> Path:

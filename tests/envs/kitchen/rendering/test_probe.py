@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import builtins
 import importlib
+import os
+import subprocess
 import sys
 from typing import Any
 
@@ -28,6 +30,27 @@ def test_broken_mujoco_gl_is_reported_not_raised(monkeypatch: pytest.MonkeyPatch
     assert found.backend is None
     assert "nonsense" in found.detail
     assert "unset it" in probe._import_hint()
+
+
+def test_all_probes_survive_an_environment_in_which_mujoco_cannot_be_imported() -> None:
+    script = (
+        "from forestall.envs.kitchen.rendering import probe\n"
+        "probe._GL_BACKENDS = ()\n"
+        "for p in probe.probe_renderers(): print(p.name, p.works, p.hint)\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"MUJOCO_GL": "nonsense"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    lines = run.stdout.splitlines()
+    assert [line.split()[:2] for line in lines] == [
+        ["embree", "False"], ["rays", "False"], ["gl", "False"],
+    ]  # fmt: skip
+    assert "unset it" in lines[0]
 
 
 def test_probe_gl_tries_what_the_environment_says_first(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,15 +1,21 @@
-"""Chooses a renderer by name."""
+"""Chooses a renderer by name; imports mujoco only when one is made.
+
+A bad MUJOCO_GL makes importing mujoco fail, and the probes must survive that.
+"""
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
-
-import mujoco
+from typing import TYPE_CHECKING
 
 from forestall.envs.kitchen.rendering.appearance import Appearance
 from forestall.errors import InputError, UnknownNameError
 from forestall.interfaces import Renderer
 from forestall.types.observation import Intrinsics
+
+if TYPE_CHECKING:
+    import mujoco
 
 RENDERERS = ("auto", "embree", "gl", "rays")
 
