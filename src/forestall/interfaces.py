@@ -34,7 +34,7 @@ class Environment(Protocol):
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
         """Look towards world points: one frame for each group of points that one view can hold.
 
-        Straight ahead and slightly down when there are none.
+        Straight ahead and slightly down when there are none. What the hand holds is in a view, too.
         """
 
     def execute(self, subtask: Subtask) -> SkillOutcome:

@@ -65,6 +65,7 @@ class _Episode:
     observation: Observation
     index: int = 0
     replans: int = 0
+    worked_at: Vec3 | None = None
     bound: dict[str, str] = field(default_factory=dict)
     boundaries: list[BoundaryRecord] = field(default_factory=list)
     executed: list[ExecutedRecord] = field(default_factory=list)
@@ -214,6 +215,7 @@ class Runtime:
                 verdict=answer.verdict,
                 diagnosis=answer.diagnosis,
                 replan=answer.replan,
+                why=answer.why,
                 seconds=tuple(sorted((k, v) for k, v in spent.items() if v > 0)),
                 time_s=self._environment.time_s,
             )
@@ -229,6 +231,7 @@ class Runtime:
         for name in context.subtask.args:
             if is_instance(name):
                 episode.bound[category_of(name)] = name
+        episode.worked_at = outcome.hand_world_m
         boundary = len(episode.boundaries) - 1
         episode.executed.append(ExecutedRecord(context.subtask, outcome, boundary))
         for listener in self._listeners:
@@ -260,10 +263,10 @@ class Runtime:
         )
 
     def _look(self, episode: _Episode) -> Observation:
-        """Towards the arguments of the next subtask that are somewhere else than in the hand."""
+        """Towards where the hand let go last, and the arguments that it does not hold."""
         subtask = self._ground(episode)
         holding = episode.graph.holding
-        points: list[Vec3] = []
+        points: list[Vec3] = [] if episode.worked_at is None else [episode.worked_at]
         for name in subtask.args:
             node = episode.graph.get(name)
             if node is not None and node.centroid_m is not None and node.id != holding:

@@ -107,6 +107,11 @@ class Category:
     aliases: tuple[str, ...] = ()
     words: str = ""  # how a person calls it
 
+    @property
+    def washable_food(self) -> bool:
+        """Whether running water does it no harm: whole food, which has its skin or shell."""
+        return self.slices_into is not None or self.cracks_into is not None
+
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:

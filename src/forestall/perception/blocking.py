@@ -1,8 +1,9 @@
 """What stands in the way of what: the approach corridor, and masks that cut each other.
 
-Two signs, after REFLECT's "blocking" (image overlap and smaller depth): a thing on the same
-support stands between another and the robot, or its mask cuts off a good part of the other's
-outline with a step in depth. Called by `fuse.py`.
+A hand comes over the open edge of a support, or through the open side of a container; what stands
+in its corridor blocks. Where one mask cuts off a good part of another's outline with a step in
+depth (REFLECT's "blocking": image overlap and smaller depth), the corridor is tested with slack,
+because part of the target is hidden. Called by `fuse.py`.
 """
 
 from __future__ import annotations

@@ -108,7 +108,7 @@ class PerceptionConfig:
     gone_share: float = 0.5
     unmoved_share: float = 0.8
     expected_pixels: float = 4.0
-    interior_share: float = 0.2
+    interior_share: float = 0.1
     same_place_m: float = 0.3
 
 

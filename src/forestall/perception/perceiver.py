@@ -6,7 +6,7 @@ Called by the runtime; calls a segmenter and a state estimator (given by the con
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from forestall.errors import PerceptionError
 from forestall.interfaces import Segmenter, StateEstimator
@@ -16,7 +16,6 @@ from forestall.perception.naming import name_detections
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
 from forestall.perception.unproject import Points, clouds, label_image
-from forestall.types.facts import category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
@@ -96,7 +95,7 @@ class GraphPerceiver:
             frame=frame,
             labels=labels,
             ids=tuple(names),
-            categories=tuple(_category(d, n) for d, n in zip(detections, names, strict=True)),
+            categories=tuple(d.category for d in detections),
             clouds=tuple(found),
             states=tuple(states),
         )
@@ -106,10 +105,3 @@ class GraphPerceiver:
         if category is not None and category.fixture:
             return self._config.fixture_voxel_m
         return self._config.voxel_m
-
-
-def _category(detection: Detection, name: str) -> str:
-    return detection.category or category_of(name)
-
-
-__all__: Sequence[str] = ["GraphPerceiver"]

@@ -63,7 +63,7 @@ def _parent(
     for r in candidates:
         predicate = _relation(vocabulary, stack.things[r].category)
         if predicate == "inside":
-            if _inside(stack, a, r, share[r], vocabulary, config):
+            if _inside(stack, a, r, share[r], bottom, vocabulary, config):
                 holding.append((float(area[r]), predicate, r))
             continue
         contacts = _contacts(stack, a, r, bottom, config)
@@ -135,6 +135,7 @@ def _inside(
     a: int,
     r: int,
     share: float,
+    bottom_m: float,
     vocabulary: Vocabulary,
     config: PerceptionConfig,
 ) -> bool:
@@ -150,14 +151,14 @@ def _inside(
             return False
     elif float(stack.low_m[a, 2]) > rim + config.rim_slack_m:
         return False
-    return _walls(stack, a, r, config) >= config.enclosed_sectors
+    return _walls(stack, a, r, bottom_m, config) >= config.enclosed_sectors
 
 
-def _walls(stack: Stack, a: int, r: int, config: PerceptionConfig) -> int:
+def _walls(stack: Stack, a: int, r: int, bottom_m: float, config: PerceptionConfig) -> int:
     """In how many directions around `a`, at its height, points of `r` are found."""
     centre = (stack.low_m[a, :2] + stack.high_m[a, :2]) / 2
     p: Points = stack.things[r].points_world_m
-    level = (p[:, 2] >= stack.low_m[a, 2] - config.wall_reach_m) & (
+    level = (p[:, 2] >= bottom_m - config.wall_reach_m) & (
         p[:, 2] <= stack.high_m[a, 2] + config.wall_reach_m
     )
     offset = p[level][:, :2] - centre

@@ -125,6 +125,9 @@ class Automatic:
     ) -> list[Change]:
         layout = self.layout
         changes: list[Change] = []
+        kind = layout.category(x)
+        if device.cleans and kind.food and not kind.washable_food:
+            changes.append(Change(condition, (), layout.spoils(x)))
         for works, value in ((device.heats, "hot"), (device.cools, "cold")):
             if works and layout.has(x, "temperature"):
                 warm = layout.becomes(x, "temperature", value)

@@ -79,6 +79,8 @@ def _work(state: State, device: Device, receptacle: str) -> None:
             set_value(state, thing, "temperature", "hot")
         if device.cools:
             set_value(state, thing, "temperature", "cold")
+        if device.cleans and state.category(thing).food and not state.category(thing).washable_food:
+            spoil(state, thing)
         if may_cook(device, state.kinds[thing]) and state.value(thing, "cooked") == "raw":
             _cook(state, thing, inside)
 

@@ -144,7 +144,8 @@ def with_driving(
         place = _place(state, subject)
         steps_here = [subtask]
         if (place != where or over) and subject != state.held:
-            steps_here.insert(0, Subtask("navigate_to_obj", (_landmark(state, subject),)))
+            landmark = over or _landmark(state, subject)
+            steps_here.insert(0, Subtask("navigate_to_obj", (landmark,)))
         where = place
         if place == subject and place in loose and state.instances(state.kinds[place])[0] == place:
             steps_here = [_renamed(s, place, state.kinds[place]) for s in steps_here]

@@ -7,7 +7,7 @@ from enum import Enum
 from typing import Any
 
 from forestall.types.graph import SceneGraph
-from forestall.types.observation import Observation
+from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Task
 from forestall.types.verdict import Diagnosis, Replan, Verdict
@@ -28,6 +28,7 @@ class SkillOutcome:
     status: SkillStatus
     duration_s: float
     reason: str = ""
+    hand_world_m: Vec3 | None = None  # where the hand let go of something
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,7 @@ class Event:
 class BoundaryRecord:
     """One subtask boundary: what was seen, judged and decided before the subtask."""
 
-    index: int  # position in the executed sequence
+    index: int  # position among all boundaries
     subtask: Subtask  # as grounded
     graph: SceneGraph  # whole fused graph
     scoped: SceneGraph  # what concerns the subtask
@@ -53,13 +54,14 @@ class BoundaryRecord:
     verdict: Verdict | None
     diagnosis: Diagnosis | None = None
     replan: Replan | None = None
+    why: str = ""  # the strategy's reason, where the verdict does not say it all
     seconds: tuple[tuple[str, float], ...] = ()  # compute by phase
     time_s: float = 0.0  # simulated
 
 
 @dataclass(frozen=True, slots=True)
 class ExecutedRecord:
-    """One executed subtask."""
+    """One executed subtask; `index` is that of the boundary before it."""
 
     subtask: Subtask
     outcome: SkillOutcome

@@ -79,6 +79,10 @@ def _work(household: Household, name: str, device: Device) -> set[str]:
     if device.cleans:
         for thing in contents:
             household.set_state(thing, "dirty", "clean")
+        for food in within:
+            kind = household.category(food)
+            if kind.food and not kind.washable_food:
+                household.spoil(food, f"{food} was under the running {device.fills or 'water'}")
     if device.fills is not None:
         for thing in contents:
             _fill(household, thing, device, device.fills)

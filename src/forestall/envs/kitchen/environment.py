@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,6 +33,9 @@ SCAN_FRAMES = 7
 SCAN_TILT_RAD = math.radians(25.0)
 FLOOR_TILT_RAD = math.radians(62.0)
 """Shows the floor from 0.05 m to 1.0 m from the robot."""
+
+NECK_RAD = math.radians(80.0)
+"""What is further to the side than this is looked at by turning the base."""
 
 ONE_VIEW_RAD = math.radians(17.0)
 """Directions this near to a group's middle are looked at in one frame."""
@@ -64,6 +68,9 @@ class Stage(World, Protocol):
 
     def turn_to(self, yaw_rad: float) -> float:
         """Turn on the spot to a heading; returns the simulated seconds."""
+
+    def position_world_m(self, name: str) -> Vec3 | None:
+        """Middle of a thing's box, None when it is not there."""
 
     def look_at(self, point_world_m: Sequence[float]) -> npt.NDArray[np.float64]:
         """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
@@ -173,20 +180,33 @@ class KitchenEnvironment:
         return self._observation(frames)
 
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
-        """One frame for each group of points; straight ahead and slightly down without any."""
+        """One frame for each group of points, the hand's among them when it holds something.
+
+        The base turns where the neck does not reach, which takes its time.
+        """
         world = self._stage
+        if self._acting.household.held is not None:
+            focus = (world.gripper_position_world_m, *focus)
         if not focus:
             return self._observation([self._frame(world.camera_to_world(0.0, AHEAD_TILT_RAD))])
         eye = world.look_at(focus[0])[:3, 3]
-        aims = _aims(np.asarray(focus, dtype=float) - eye)
-        return self._observation([self._frame(world.look_at((eye + aim).tolist())) for aim in aims])
+        frames = []
+        for aim in _aims(np.asarray(focus, dtype=float) - eye):
+            heading = math.atan2(aim[1], aim[0])
+            if abs(_wrapped(heading - world.robot_yaw_rad)) > NECK_RAD:
+                self._acting.household.time_s += world.turn_to(heading)
+            frames.append(self._frame(world.look_at((eye + aim).tolist())))
+        return self._observation(frames)
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""
         effects.settle(self._acting.household, self._effect_config)
+        held = self._acting.household.held
         outcome = perform(self._acting, subtask)
         effects.settle(self._acting.household, self._effect_config)
-        return outcome
+        if held is None or self._acting.household.held is not None:
+            return outcome
+        return replace(outcome, hand_world_m=self._stage.position_world_m(held))
 
     def drop_held(self, hard: bool = False) -> str | None:
         """Let go of the held object where the robot is; its name, None when nothing fell.
@@ -243,7 +263,10 @@ class KitchenEnvironment:
 
 
 def _aims(ways: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
-    """Directions to look in, one for each group of (n, 3) directions that fit into one view."""
+    """Directions to look in, one for each group of (n, 3) directions that fit into one view.
+
+    The group of the last direction comes last.
+    """
     units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
     groups: list[list[npt.NDArray[np.float64]]] = []
     for unit in units:
@@ -255,7 +278,13 @@ def _aims(ways: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
                 break
         else:
             groups.append([unit])
+    last = next(g for g in groups if any((u == units[-1]).all() for u in g))
+    groups = [*(g for g in groups if g is not last), last]
     return [np.mean(group, axis=0) for group in groups]
+
+
+def _wrapped(angle_rad: float) -> float:
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
 def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stage:

@@ -241,6 +241,10 @@ class FlatWorld:
         pose[:3, 3] = (self._robot_x_m, -0.5, 1.5)
         return pose
 
+    def position_world_m(self, name: str) -> Vec3 | None:
+        """A flat world knows no places."""
+        return None
+
     def look_at(self, point_world_m: Sequence[float]) -> npt.NDArray[np.float64]:
         """The camera turned towards a point."""
         x, y, z = (p - q for p, q in zip(point_world_m, (self._robot_x_m, -0.5, 1.5), strict=True))

@@ -380,6 +380,14 @@ class KitchenWorld:
         if found is not None:
             self.settle(name, *found)
 
+    def position_world_m(self, name: str) -> Vec3 | None:
+        """Middle of what is seen of an instance; None when it is not there."""
+        box = self.box_world_m(name)
+        if box is None:
+            return None
+        (a, b, c), (d, e, f) = box
+        return ((a + d) / 2, (b + e) / 2, (c + f) / 2)
+
     def box_world_m(self, name: str) -> tuple[Vec3, Vec3] | None:
         """Low and high corner of what is seen of an instance; None when it is not there."""
         if name not in self.bodies.present:
