@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
-    from forestall.interfaces import Listener
     from forestall.types.demonstration import Demonstration
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
@@ -64,8 +63,8 @@ def run(
         provenance={**dict(provenance(config)), "memory": used},
         page=str(page),
     )
-    listeners: list[Listener] = [recorder] if quiet else [recorder, ProgressLine()]
-    record = run_episode(prepared, demonstrations, listeners, used)
+    with ProgressLine(quiet=quiet) as line:
+        record = run_episode(prepared, demonstrations, [recorder, line], used)
     write_page(record, page)
     data = read_record(folder / RECORD_NAME)
     if as_json:
@@ -108,12 +107,13 @@ def _summary(data: dict[str, Any]) -> None:
         score = "none" if alarm["score"] is None else f"{alarm['score']:.2f}"
         console.print(
             f"  alarm before {escape(alarm['subtask'])}: score {score} < "
-            f"{alarm['threshold']:.2f}: {escape(alarm['cause'] or '')}"
+            f"{alarm['threshold']:.2f}: {escape(alarm['cause'] or '')}",
+            soft_wrap=True,
         )
-    total = sum(data["compute_s"].values())
     console.print(
         f"  {len(data['executed'])} subtasks, {data['replans']} replans, "
-        f"{data['simulated_s']:.0f} s of robot time, {total:.1f} s of computing; "
-        f"states: {escape(str(data['perception']['state_estimator']))}"
+        f"{data['simulated_s']:.0f} s of robot time, {data['reasoning_s']:.1f} s of reasoning; "
+        f"states: {escape(str(data['perception']['state_estimator']))}",
+        soft_wrap=True,
     )
     print(data["page"], file=sys.stdout)

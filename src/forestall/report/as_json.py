@@ -124,6 +124,7 @@ def boundary_json(
         "verdict": None if b.verdict is None else _verdict(b.verdict),
         "diagnosis": None if b.diagnosis is None else _diagnosis(b.diagnosis),
         "replan": None if b.replan is None else _replan(b.replan),
+        "why": b.why,
         "plan_before": [str(s) for s in before],
         "plan_after": None if after is None else [str(s) for s in after],
         "seconds": dict(b.seconds),

@@ -130,6 +130,7 @@ def boundary_of(index: int, context: BoundaryContext, answer: StrategyAnswer) ->
         verdict=answer.verdict,
         diagnosis=answer.diagnosis,
         replan=answer.replan,
+        why=answer.why,
         seconds=answer.seconds,
         time_s=context.observation.time_s,
     )

@@ -115,11 +115,14 @@ class GripperState:
     """The robot's own sense of its hand.
 
     `holding` is the instance name of what is held as the robot knows it, None for an empty hand.
-    `position_world_m` is where the hand is.
+    `position_world_m` is where the hand is. `released` is what the subtask just executed let go on
+    purpose, `released_world_m` where: the arm knows it, whether or not the camera sees it.
     """
 
     holding: str | None
     position_world_m: Vec3
+    released: str | None = None
+    released_world_m: Vec3 | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

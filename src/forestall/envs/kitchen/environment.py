@@ -145,6 +145,7 @@ class KitchenEnvironment:
         self._build = build or _build_kitchen
         self._make = make or _maker(renderer)
         self._seed: int | None = None
+        self._released: tuple[str, Vec3] | None = None
         self._world: Stage | None = None
         self._renderer: Renderer | None = None
         self._robot: Robot | None = None
@@ -162,6 +163,7 @@ class KitchenEnvironment:
             self._seed = seed
         else:
             self._world.reset()
+        self._released = None
         household = Household(self._vocabulary, self._world, self._world.instances)
         self._robot = Robot(household, self._times)
         effects.settle(household, self._effect_config)
@@ -204,9 +206,12 @@ class KitchenEnvironment:
         held = self._acting.household.held
         outcome = perform(self._acting, subtask)
         effects.settle(self._acting.household, self._effect_config)
-        if held is None or self._acting.household.held is not None:
-            return outcome
-        return replace(outcome, hand_world_m=self._stage.position_world_m(held))
+        self._released = None
+        if held is not None and self._acting.household.held is None:
+            where = self._stage.position_world_m(held)
+            self._released = None if where is None else (held, where)
+            outcome = replace(outcome, hand_world_m=where)
+        return outcome
 
     def drop_held(self, hard: bool = False) -> str | None:
         """Let go of the held object where the robot is; its name, None when nothing fell.
@@ -256,7 +261,9 @@ class KitchenEnvironment:
         world, household = self._stage, self._acting.household
         return Observation(
             frames=tuple(frames),
-            gripper=GripperState(household.held, world.gripper_position_world_m),
+            gripper=GripperState(
+                household.held, world.gripper_position_world_m, *(self._released or ())
+            ),
             time_s=household.time_s,
             robot_position_world_m=world.robot_position_world_m,
         )
