@@ -13,8 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from forestall.benchmark.faults import apply_scene_faults
+from forestall.benchmark.files import load_scenario, load_task
 from forestall.cli.main import call
+from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.memory.store import open_store
+from forestall.perception.folder import write_observation
 from forestall.report.record import read_record
 
 pytestmark = pytest.mark.slow
@@ -98,3 +102,32 @@ def test_a_killed_run_leaves_memory_and_record_readable(memory: Path, tmp_path: 
     record = read_record(lines)
     assert record["complete"] is False
     assert len(record["boundaries"]) >= 1
+
+
+def test_a_stored_observation_is_judged(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    loaded = load_task("heat-potato")
+    for name, faults in (("fine", ()), ("full", load_scenario("microwave-occupied").faults)):
+        needs = apply_scene_faults(loaded.task.scene, faults, loaded.vocabulary)
+        kitchen = KitchenEnvironment(needs, loaded.vocabulary)
+        kitchen.reset(14)
+        for subtask in loaded.task.plan.subtasks[:8]:
+            kitchen.execute(subtask)
+        node = kitchen.oracle.truth().get("Microwave-1")
+        assert node is not None and node.centroid_m is not None
+        observation = kitchen.observe([node.centroid_m])
+        states = {n.id: kitchen.oracle.states(n.id) for n in kitchen.oracle.truth().nodes}
+        write_observation(tmp_path / name, observation, states)
+    options = ["--subtask", "put_in(Plate, Microwave)", "--task", "heat-potato"]
+    codes = {}
+    for name in ("fine", "full"):
+        arguments = ["check", str(tmp_path / name), *options, "--memory", str(memory), "--json"]
+        codes[name] = call(arguments)
+        data = json.loads(capsys.readouterr().out)
+    assert codes == {"fine": 0, "full": 1}
+    assert data["decision"] == "replan" and "Bowl-1" in data["cause"]
+    assert call(["check", str(tmp_path / "absent"), *options, "--memory", str(memory)]) == 2
+    assert "absent" in capsys.readouterr().err
+    assert call(["check", str(tmp_path / "fine"), "--subtask", "put_in(Plate, Microwave)"]) == 2
+    assert "--memory" in capsys.readouterr().err

@@ -37,6 +37,9 @@ class Environment(Protocol):
         Straight ahead and slightly down when there are none. What the hand holds is in a view, too.
         """
 
+    def approach(self, name: str) -> float:
+        """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
+
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; refuse with a reason when its needs are not met."""
 

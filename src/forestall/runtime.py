@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from forestall.grounding import executable, ground_subtask
+from forestall.grounding import executable, ground_subtask, is_open_support
 from forestall.types.episode import (
     BoundaryRecord,
     EpisodeEnd,
@@ -171,6 +171,8 @@ class Runtime:
     def _boundary(self, episode: _Episode) -> tuple[BoundaryContext, StrategyAnswer]:
         """Look towards what the next subtask concerns, perceive, and ask the strategy."""
         before = dict(episode.seconds)
+        with episode.phase("act"):
+            self._approach(episode)
         with episode.phase("observe"):
             observation = self._look(episode)
         looks = 1
@@ -261,6 +263,23 @@ class Runtime:
             episode.observation.robot_position_world_m,
             episode.bound,
         )
+
+    def _approach(self, episode: _Episode) -> None:
+        """Go where the subtask will be done and look from there.
+
+        A skill whose target is out of reach drives there by itself; doing that first lets the
+        decision be taken on what can be seen at the place and not from across the room.
+        """
+        subtask = self._ground(episode)
+        node = episode.graph.get(subtask.args[-1])
+        if (
+            subtask.skill == "navigate_to_obj"
+            or node is None
+            or node.centroid_m is None
+            or is_open_support(self._vocabulary, node.category)
+        ):
+            return
+        self._environment.approach(node.id)
 
     def _look(self, episode: _Episode) -> Observation:
         """Towards where the hand let go last, and the arguments that it does not hold."""

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -244,3 +245,21 @@ def test_reset_forgets() -> None:
     robot.sees([COUNTER, at("Mug-1", 0.0, 0.3, 0.9, MUG, True)])
     robot._perceiver.reset()
     assert robot.sees([COUNTER]).get("Mug-1") is None
+
+
+def test_what_is_held_is_placed_from_one_view_because_it_turns_with_the_robot() -> None:
+    robot = Robot()
+    robot.sees([COUNTER, at("Plate-1", 0.1, 0.3, 0.9, (0.22, 0.22, 0.02), True)])
+    plate = at("Plate-1", 0.0, 0.0, 1.2, (0.22, 0.22, 0.02), True)
+    potato = at("Potato-1", 0.0, 0.0, 1.22, (0.1, 0.07, 0.065))
+    first = observed([COUNTER, plate, potato], EYE, holding="Plate-1", time_s=5.0)
+    shift = (0.15, 0.0, 0.0)
+    second = observed(
+        [COUNTER, plate.moved(shift), potato.moved(shift)], EYE, holding="Plate-1", time_s=5.0
+    )
+    graph = robot._perceiver.perceive(replace(second, frames=(*first.frames, *second.frames)))
+    for name in ("Plate-1", "Potato-1"):
+        node = graph.get(name)
+        assert node is not None and node.centroid_m is not None
+        assert node.centroid_m[0] == pytest.approx(0.15, abs=0.02)
+    assert truth(graph, "on_top_of(Potato-1, Plate-1)") is Truth.TRUE

@@ -67,6 +67,10 @@ class FaultyEnvironment:
         """As the wrapped environment."""
         return self._inner.observe(focus)
 
+    def approach(self, name: str) -> float:
+        """Drive near, undisturbed."""
+        return self._inner.approach(name)
+
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run a skill, with every fault that is due."""
         due = self._due(subtask)

@@ -15,6 +15,7 @@ from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.relations import directions
+from forestall.perception.sightings import gather, placing
 from forestall.perception.support import Parent, parents
 from forestall.perception.tracks import (
     Fate,
@@ -28,7 +29,7 @@ from forestall.perception.tracks import (
 from forestall.perception.unproject import Points, robust_box
 from forestall.types.facts import GRIPPER, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
-from forestall.types.observation import Observation, Vec3
+from forestall.types.observation import GripperState, Observation, Vec3
 from forestall.vocabulary import Vocabulary
 
 _STILL_M = 0.03
@@ -62,8 +63,9 @@ class SceneMemory:
         seen = self._take_in(views, fate, observation.time_s)
         if self._held is not None:
             self._hold(self._held, seen)
-        moved = self._carry(places, seen)
-        if former is not None and former != self._held and former not in seen:
+        put = self._put_down(observation.gripper, seen)
+        moved = put | self._carry(places, seen | put)
+        if former is not None and former != self._held and former not in seen | put:
             self._drop_from_memory(former, seen)
         self._forget_gone(fate, seen, moved, views)
         self._replace_cut(seen, fate, former, observation.time_s)
@@ -72,27 +74,35 @@ class SceneMemory:
 
     def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""
-        shown: dict[str, list[tuple[View, int]]] = {}
-        for view in views:
-            for label, name in enumerate(view.ids):
-                if view.clouds[label] is not None:
-                    shown.setdefault(name, []).append((view, label))
+        found = gather(views)
+        fixtures = {n for n, f in found.items() if self._is_fixture(f[-1].category)}
+        movable = {n: f for n, f in found.items() if n not in fixtures}
+        riding = self._riding(self._held)
+        shown = placing(movable, self._held, riding, self._config.ring_m)
+        shown |= {n: found[n] for n in fixtures}
         for name in sorted(shown):
-            sightings = shown[name]
-            newest, label = sightings[-1]
             track = self.tracks.get(name)
             if track is None:
-                track = Track(name, newest.categories[label], first_seen_s=time_s)
+                track = Track(name, shown[name][-1].category, first_seen_s=time_s)
                 self.tracks[name] = track
-            clouds = [c for view, at in sightings if (c := view.clouds[at]) is not None]
-            self._place(track, np.concatenate([c.points_world_m for c in clouds]), fate.get(name))
-            track.pixels = clouds[-1].pixels
+            points = [s.cloud.points_world_m for s in shown[name]]
+            self._place(track, np.concatenate(points), fate.get(name))
+            track.pixels = found[name][-1].cloud.pixels
             track.last_seen_s = time_s
-            by_size = sorted(zip(clouds, sightings, strict=True), key=lambda s: s[0].pixels)
-            for _, (view, at) in by_size:
-                known = {a: v for a, v in view.states[at].items() if v is not None}
+            for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
+                known = {a: v for a, v in sighting.states.items() if v is not None}
                 track.states.update(known)
         return set(shown)
+
+    def _riding(self, name: str | None) -> set[str]:
+        """What is in or on a thing, at any depth."""
+        found: set[str] = set()
+        pending = [] if name is None else [name]
+        while pending:
+            fresh = {t.id for t in self._children(pending.pop())} - found
+            found |= fresh
+            pending += sorted(fresh)
+        return found
 
     def _place(self, track: Track, fresh: Points, fate: Fates | None) -> None:
         """Set a track's cloud from the newest views and what they leave standing of the old."""
@@ -129,6 +139,17 @@ class SceneMemory:
                 track.low_m = track.high_m = track.centroid_m = hand
             else:
                 track.move(hand - _middle(track))
+
+    def _put_down(self, gripper: GripperState, seen: set[str]) -> set[str]:
+        """What the arm let go is where it let go, even where no view shows it."""
+        track = self.tracks.get(gripper.released or "")
+        if track is None or track.id in seen or gripper.released_world_m is None:
+            return set()
+        place = np.asarray(gripper.released_world_m, dtype=np.float64)
+        if track.points_world_m is None:
+            return set()
+        track.move(place - _middle(track))
+        return {track.id}
 
     def _carry(self, places: Mapping[str, Points], seen: set[str]) -> set[str]:
         """Move what rests in or on something that moved; returns what was moved unseen."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.envs.kitchen import effects
 from forestall.envs.kitchen.household import Household, Placed
-from forestall.envs.kitchen.skills import Robot, SkillTimes, perform
+from forestall.envs.kitchen.skills import RefusalError, Robot, SkillTimes, perform
 from forestall.errors import ForestallError, SceneError
 from forestall.interfaces import Renderer, World
 from forestall.types.episode import Event, SkillOutcome
@@ -199,6 +200,15 @@ class KitchenEnvironment:
                 self._acting.household.time_s += world.turn_to(heading)
             frames.append(self._frame(world.look_at((eye + aim).tolist())))
         return self._observation(frames)
+
+    def approach(self, name: str) -> float:
+        """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
+        household = self._acting.household
+        start_s = household.time_s
+        if household.exists(name):
+            with suppress(RefusalError):
+                self._acting.approach(name)
+        return household.time_s - start_s
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""

@@ -1,0 +1,75 @@
+"""Which views of one observation tell where a thing is.
+
+The views of an observation show one moment, but the robot turns between them, and what it holds
+turns with it. So what is held, and what rides in or on it, is placed from one view only. Called by
+`fuse.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forestall.perception.tracks import View
+from forestall.perception.unproject import Cloud
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """One thing in one view (`view` is its index)."""
+
+    view: int
+    category: str
+    cloud: Cloud
+    states: Mapping[str, str | None]
+
+
+def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
+    """Every located thing's sightings, oldest first."""
+    found: dict[str, list[Sighting]] = {}
+    for index, view in enumerate(views):
+        for name, category, cloud, states in zip(
+            view.ids, view.categories, view.clouds, view.states, strict=True
+        ):
+            if cloud is not None:
+                found.setdefault(name, []).append(Sighting(index, category, cloud, states))
+    return found
+
+
+def placing(
+    found: Mapping[str, Sequence[Sighting]], held: str | None, riding: Collection[str], gap_m: float
+) -> dict[str, list[Sighting]]:
+    """The sightings that tell where each thing is.
+
+    Args:
+        found: all sightings of an observation.
+        held: what the robot holds.
+        riding: what is known to be in or on it; left out where the view that places the held
+            thing does not show it.
+        gap_m: views of a thing that lie farther apart show it at two places; the one of the view
+            that places the held thing counts, else the newest.
+    """
+    anchor = found[held][-1].view if held is not None and held in found else None
+    chosen: dict[str, list[Sighting]] = {}
+    for name, sightings in found.items():
+        anchored = [s for s in sightings if s.view == anchor]
+        if anchor is not None and (name == held or name in riding):
+            agreeing = anchored
+        else:
+            agreeing = _agreeing(sightings, sightings[-1], gap_m)
+            if len(agreeing) < len(sightings) and anchored:
+                agreeing = _agreeing(sightings, anchored[0], gap_m)
+        if agreeing:
+            chosen[name] = agreeing
+    return chosen
+
+
+def _agreeing(sightings: Sequence[Sighting], base: Sighting, gap_m: float) -> list[Sighting]:
+    return [s for s in sightings if _gap_m(s.cloud, base.cloud) <= gap_m]
+
+
+def _gap_m(one: Cloud, other: Cloud) -> float:
+    apart = np.maximum(one.low_m - other.high_m, other.low_m - one.high_m)
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
