@@ -18,7 +18,8 @@ import numpy.typing as npt
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.envs.kitchen import effects
 from forestall.envs.kitchen.household import Household, Placed
-from forestall.envs.kitchen.skills import RefusalError, Robot, SkillTimes, perform
+from forestall.envs.kitchen.naming import RefusalError
+from forestall.envs.kitchen.skills import Robot, SkillTimes, perform
 from forestall.errors import ForestallError, SceneError
 from forestall.interfaces import Renderer, World
 from forestall.types.episode import Event, SkillOutcome
