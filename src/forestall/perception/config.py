@@ -34,6 +34,9 @@ class PerceptionConfig:
         min_contacts: support points that must be found there.
         inside_share: share of points within the container's footprint (REFLECT: 0.5).
         on_top_share: share of points above the support's footprint (REFLECT: 0.7).
+        on_dish_share: the same for a dish of which plenty of contacts are seen; what lies on it hides
+            its far half.
+        plenty_contacts: so many support points.
         covered_share: share of a small support that lies under an object (a burner under a pot).
         footprint_slack_m: tolerance of footprints.
         sectors: directions in which walls are looked for around something contained.
@@ -83,6 +86,8 @@ class PerceptionConfig:
     min_contacts: int = 3
     inside_share: float = 0.5
     on_top_share: float = 0.7
+    on_dish_share: float = 0.4
+    plenty_contacts: int = 30
     covered_share: float = 0.5
     footprint_slack_m: float = 0.01
     sectors: int = 8

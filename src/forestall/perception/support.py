@@ -67,7 +67,10 @@ def _parent(
                 holding.append((float(area[r]), predicate, r))
             continue
         contacts = _contacts(stack, a, r, bottom, config)
-        over_it = share[r] >= config.on_top_share
+        needed = config.on_top_share
+        if contacts >= config.plenty_contacts and not vocabulary[stack.things[r].category].fixture:
+            needed = config.on_dish_share
+        over_it = share[r] >= needed
         level = abs(float(stack.high_m[r, 2]) - bottom) <= config.contact_below_m
         if contacts >= config.min_contacts and (over_it or _covers(stack, a, r, config)):
             holding.append((float(area[r]), predicate, r))
