@@ -16,6 +16,7 @@ from forestall.benchmark.goals import TruthGoalChecker
 from forestall.build import RunConfig, make_strategy
 from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.envs.kitchen.flat_world import flat_environment
+from forestall.errors import PerceptionError
 from forestall.memory.recording import demonstration_from
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
@@ -143,3 +144,24 @@ def test_limits_end_an_episode() -> None:
     )
     assert never.success is False
     assert never.initial_plan != Plan(never.task.plan.subtasks)
+
+
+def test_an_error_in_the_middle_is_recorded() -> None:
+    class Broken(TruthPerceiver):
+        calls = 0
+
+        def perceive(self, observation: Observation) -> SceneGraph:
+            self.calls += 1
+            if self.calls > 3:
+                raise PerceptionError("the camera is gone")
+            return super().perceive(observation)
+
+    loaded = load_task("make-coffee")
+    kitchen = flat_environment(loaded.task.scene, loaded.vocabulary)
+    config = RunConfig("make-coffee", strategy="none")
+    strategy = make_strategy(config, loaded.vocabulary, None)
+    runtime = Runtime(kitchen, Broken(kitchen, loaded.vocabulary), strategy, loaded.vocabulary)
+    record = runtime.run(loaded.task, loaded.task.plan, 0)
+    assert record.end is EpisodeEnd.ERROR
+    assert record.failures == ("the run broke off: the camera is gone",)
+    assert len(record.executed) == len(record.boundaries) == 2

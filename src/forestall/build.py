@@ -214,7 +214,7 @@ def _scorer(kitchen: KitchenEnvironment) -> Callable[[EpisodeRecord], EpisodeRec
             record,
             success=strict,
             weak_success=weak,
-            failures=failures,
+            failures=(*record.failures, *failures),
             events=kitchen.oracle.events(),
         )
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from forestall.errors import ForestallError
 from forestall.grounding import executable, ground_subtask, is_open_support
 from forestall.types.episode import (
     BoundaryRecord,
@@ -111,6 +112,8 @@ class Runtime:
     ) -> EpisodeRecord:
         """Run one episode to its end.
 
+        An error of the environment or of a part ends the episode; what came before is recorded.
+
         Args:
             task: goal and names.
             plan: the plan to start with (a scenario may have changed the nominal one).
@@ -130,7 +133,11 @@ class Runtime:
         episode = _Episode(task, plan, graph, observation)
         episode.add("observe", looked - started)
         episode.add("perceive", time.perf_counter() - looked)
-        end = self._loop(episode)
+        failures: tuple[str, ...] = ()
+        try:
+            end = self._loop(episode)
+        except ForestallError as error:
+            end, failures = EpisodeEnd.ERROR, (f"the run broke off: {error}",)
         record = EpisodeRecord(
             task=task,
             scenario=scenario,
@@ -140,6 +147,7 @@ class Runtime:
             boundaries=tuple(episode.boundaries),
             executed=tuple(episode.executed),
             end=end,
+            failures=failures,
             simulated_s=self._environment.time_s,
             compute_s=tuple(sorted(episode.seconds.items())),
             provenance=(*provenance, ("perception", dict(self._perceiver.describe()))),

@@ -34,7 +34,7 @@ class PerceptionConfig:
         min_contacts: support points that must be found there.
         inside_share: share of points within the container's footprint (REFLECT: 0.5).
         on_top_share: share of points above the support's footprint (REFLECT: 0.7).
-        on_dish_share: the same for a dish of which plenty of contacts are seen; what lies on it hides
+        on_dish_share: the same for a dish of which plenty of contacts show; what lies on it hides
             its far half.
         plenty_contacts: so many support points.
         covered_share: share of a small support that lies under an object (a burner under a pot).
