@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -58,4 +60,73 @@ def speed(
     )
     machine = report["machine"]
     print(f"{machine['processor']}, {machine['cores']} cores, {machine['platform']}")
+    return 0
+
+
+@bench.command
+def episodes(
+    *,
+    task: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    scenario: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    strategy: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    seeds: str = "100:105",
+    memory: Path | None = None,
+    states: str = "oracle",
+    jobs: int | None = None,
+    out: Path = Path("runs/episodes.jsonl"),
+    as_json: Json = False,
+    quiet: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Run many episodes and count successes and alarms; every alarm without scenario is false.
+
+    Args:
+        task: tasks to run undisturbed; all by default, none when only scenarios are named.
+        scenario: scenarios to run; "all" for every shipped one; none by default.
+        strategy: strategies; none and proactive by default.
+        seeds: scenes, e.g. 100:120 for 100 to 119.
+        memory: a demonstration file; the ready-made one of each task by default.
+        states: where object states come from.
+        jobs: how many processes; all cores by default.
+        out: results, one JSON line each; what is in it already is not run again.
+        as_json: print JSON instead of the table.
+        quiet: no progress on standard error.
+    """
+    from forestall.benchmark.files import scenario_names, task_names
+    from forestall.cli.progress import bar
+    from forestall.survey import jobs_for, parse_seeds, survey, table
+
+    scenarios = list(scenario_names()) if scenario == ["all"] else scenario or []
+    tasks = task or ([] if scenarios else list(task_names()))
+    todo = jobs_for(
+        tasks,
+        scenarios,
+        strategy or ["none", "proactive"],
+        parse_seeds(seeds),
+        None if memory is None else str(memory),
+        states,
+    )
+    with bar("running", quiet=quiet or as_json) as feed:
+        rows = survey(todo, jobs or os.cpu_count() or 1, out, feed)
+    lines = table(rows)
+    if as_json:
+        print(json.dumps({"seeds": seeds, "states": states, "rows": lines}, indent=2))
+        return 0
+    from forestall.cli.listing import print_table
+
+    print_table(
+        ("task", "scenario", "strategy", "succeeded", "95 %", "alarms / boundaries", "new plans"),
+        [
+            (
+                r["task"],
+                r["scenario"] or "",
+                r["strategy"],
+                f"{r['succeeded']}/{r['n']}",
+                f"{r['low']:.2f}-{r['high']:.2f}",
+                f"{r['alarms']} / {r['boundaries']}",
+                str(r["replans"]),
+            )
+            for r in lines
+        ],
+    )
+    print(f"seeds {seeds}, states: {states}, results in {out}")
     return 0

@@ -92,4 +92,7 @@ def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
         table.add_column(name, no_wrap=number == 0, style="bold" if number == 0 else None)
     for row in rows:
         table.add_row(*row)
-    Console().print(table)
+    console = Console()
+    if not console.is_terminal:
+        console.width = 240
+    console.print(table)
