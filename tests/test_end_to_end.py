@@ -10,11 +10,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from forestall.benchmark.faults import apply_scene_faults
-from forestall.benchmark.files import load_scenario, load_task
+from forestall.benchmark.files import load_scenario, load_task, scenario_names
 from forestall.cli.main import call
 from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.memory.store import open_store
@@ -24,27 +25,64 @@ from forestall.report.record import read_record
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="session")
-def memory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four demonstrations of heat-potato, recorded by the command."""
-    shared = tmp_path_factory.getbasetemp()
+def memory_of(task: str, factory: pytest.TempPathFactory) -> Path:
+    """Four demonstrations of a task, recorded once by the command; workers share them."""
+    shared = factory.getbasetemp()
     if os.environ.get("PYTEST_XDIST_WORKER"):
         shared = shared.parent
-    path, lock = shared / "heat-potato.db", shared / "heat-potato.lock"
+    path, lock = shared / f"{task}.db", shared / f"{task}.lock"
     try:
         lock.touch(exist_ok=False)
     except FileExistsError:
-        deadline = time.monotonic() + 600
+        deadline = time.monotonic() + 900
         while not path.exists() and time.monotonic() < deadline:
             time.sleep(0.5)
         return path
-    partial = shared / "recording.db"
-    arguments = ["demos", "record", str(partial), "--task", "heat-potato", "--quiet"]
+    partial = shared / f"recording-{task}.db"
+    arguments = ["demos", "record", str(partial), "--task", task, "--jobs", "1", "--quiet"]
     assert call(arguments) == 0
     partial.rename(path)
     return path
 
 
+@pytest.fixture
+def memory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Demonstrations of heat-potato."""
+    return memory_of("heat-potato", tmp_path_factory)
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
+    """Run the command and read its record."""
+    capsys.readouterr()
+    code = call(["run", *arguments, "--json", "--quiet"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        pytest.param(s, marks=pytest.mark.xdist_group(load_scenario(s).task))
+        for s in scenario_names()
+    ],
+)
+def test_every_scenario_from_pixels(
+    scenario: str,
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    task = load_scenario(scenario).task
+    options = [task, "--scenario", scenario, "--seed", "15"]
+    code, data = run_json(capsys, *options, "--strategy", "none", "--out", str(tmp_path / "none"))
+    assert (code, data["success"]) == (1, False)
+    memory = memory_of(task, tmp_path_factory)
+    options += ["--memory", str(memory), "--out", str(tmp_path / "proactive")]
+    code, data = run_json(capsys, *options)
+    assert (code, data["success"]) == (0, True), data["failures"]
+    assert any(a["must_change"] for a in data["alarms"])
+
+
+@pytest.mark.xdist_group("heat-potato")
 def test_the_main_job(memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["run", "heat-potato", "--scenario", "microwave-occupied", "--seed", "11"]
     options = ["--memory", str(memory), "--out", str(tmp_path / "run"), "--json", "--quiet"]
@@ -55,6 +93,7 @@ def test_the_main_job(memory: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert data["replans"] >= 1
     alarm = next(a for a in data["alarms"] if a["must_change"])
     assert "Bowl-1" in alarm["cause"]
+    assert alarm["subtask"] == "put_in(Plate-1, Microwave-1)"
     assert alarm["score"] < alarm["threshold"]
     executed = [e["subtask"] for e in data["executed"]]
     assert executed.index("pick_up(Bowl-1)") < executed.index("put_in(Plate-1, Microwave-1)")
@@ -75,6 +114,7 @@ def test_without_replanning_the_same_scene_fails(
     assert data["success"] is False and data["failures"] and data["replans"] == 0
 
 
+@pytest.mark.xdist_group("heat-potato")
 def test_an_undisturbed_run_is_left_alone(
     memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -85,6 +125,7 @@ def test_an_undisturbed_run_is_left_alone(
     assert data["executed"][-1]["subtask"] == "toggle_on(Microwave-1)"
 
 
+@pytest.mark.xdist_group("heat-potato")
 def test_a_killed_run_leaves_memory_and_record_readable(memory: Path, tmp_path: Path) -> None:
     before = open_store(memory).digest()
     command = [sys.executable, "-m", "forestall", "run", "heat-potato", "--seed", "13"]
@@ -104,6 +145,7 @@ def test_a_killed_run_leaves_memory_and_record_readable(memory: Path, tmp_path: 
     assert len(record["boundaries"]) >= 1
 
 
+@pytest.mark.xdist_group("heat-potato")
 def test_a_stored_observation_is_judged(
     memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,11 +15,18 @@ from importlib.metadata import version
 from typing import Any
 
 import forestall
-from forestall.benchmark.faults import Fault, apply_plan_faults, apply_scene_faults, wrap
+from forestall.benchmark.faults import (
+    Fault,
+    apply_plan_faults,
+    apply_scene_faults,
+    check_steps,
+    wrap,
+)
 from forestall.benchmark.files import LoadedTask, Scenario, load_scenario, load_task
 from forestall.benchmark.goals import TruthGoalChecker
 from forestall.comparison.preconditions import mine, violations
 from forestall.comparison.score import BatchScorer, ScoreConfig
+from forestall.config import DEMONSTRATION_SEEDS
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.envs.kitchen.environment import KitchenEnvironment
@@ -102,7 +109,16 @@ def prepare(config: RunConfig) -> Prepared:
         raise InputError(f"threshold {config.threshold} is not between 0 and 1")
     if config.seed < 0:
         raise InputError(f"seed {config.seed} is negative; seeds are 0, 1, 2, ...")
-    return Prepared(config, loaded, scenario)
+    if config.seed >= DEMONSTRATION_SEEDS and config.strategy != "none":
+        raise InputError(f"seed {config.seed}: from {DEMONSTRATION_SEEDS} on are demonstrations")
+    prepared = Prepared(config, loaded, scenario)
+    if scenario is not None:
+        try:
+            apply_scene_faults(loaded.task.scene, prepared.faults, loaded.vocabulary)
+            check_steps(prepared.plan, prepared.faults, loaded.vocabulary)
+        except InputError as error:
+            raise InputError(f"scenario {scenario.name}: {error}") from error
+    return prepared
 
 
 def run_episode(

@@ -9,6 +9,9 @@ FRAME_WIDTH = 640
 FRAME_HEIGHT = 480
 VERTICAL_FOV_DEG = 60.0
 
+DEMONSTRATION_SEEDS = 1_000_000
+"""First seed of demonstration scenes; runs and surveys take seeds below."""
+
 
 def cache_dir() -> Path:
     """The folder for what can be made again (FORESTALL_CACHE overrides it)."""

@@ -1,7 +1,7 @@
 """Recording demonstrations, and the ready-made memories that are made on first use.
 
-Calls: command line → here → build, memory. Demonstration scenes have seeds of their own range, so
-that no evaluation scene is ever among them.
+Calls: command line → here → build, memory. Demonstration scenes have seeds of their own range,
+which runs and surveys refuse.
 """
 
 from __future__ import annotations
@@ -12,21 +12,17 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from importlib.resources import files
 from multiprocessing import get_context
 from pathlib import Path
 
 import forestall
 from forestall.benchmark.files import load_task
 from forestall.build import RunConfig, prepare, run_episode
-from forestall.config import cache_dir
+from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.errors import ForestallError
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
 from forestall.types.demonstration import Demonstration
-
-DEMONSTRATION_SEEDS = 1_000_000
-"""First seed of demonstration scenes; evaluation seeds are far below."""
 
 KITCHENS_PER_TASK = 4
 """Successful demonstrations per task (paper, Sec. 4 "Experimental Pipeline")."""
@@ -120,8 +116,9 @@ def ready_made(
     """The path of a task's ready-made memory, made now if it is not in the cache.
 
     It holds this task's demonstrations only, so that a first run starts soon and does not depend
-    on which other tasks were run before; `forestall demos record` makes larger ones. It is keyed by
-    what it depends on: version, sources of the household and perception, the task, states.
+    on which other tasks were run before; `forestall demos record` makes larger ones. It is keyed
+    by everything that it could depend on: the sources (command line and pages apart), the task,
+    where states come from.
 
     Args:
         task: name or file.
@@ -156,10 +153,9 @@ def _key(task: str, states: str) -> str:
     digest = hashlib.blake2b(digest_size=8)
     parts = [forestall.__version__, states, KITCHENS_PER_TASK, repr(load_task(task))]
     digest.update(json.dumps(parts).encode())
-    root = files("forestall")
-    for folder in ("envs/kitchen", "envs/kitchen/rendering", "perception", "types"):
-        for entry in sorted(root.joinpath(folder).iterdir(), key=lambda e: e.name):
-            if entry.name.endswith(".py"):
-                digest.update(entry.name.encode())
-                digest.update(entry.read_bytes())
+    root = Path(forestall.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).parts[0] not in ("cli", "report"):
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -45,7 +45,7 @@ class RuntimeConfig:
 
     Args:
         max_subtasks: how many subtasks may be executed.
-        max_replans: how many corrected plans may be adopted; afterwards the plan at hand goes on.
+        max_replans: how many corrected plans may be adopted; asking for more ends the run.
         max_looks: how many observations one boundary may take.
         keep_observations: whether pictures go into the record.
     """
@@ -62,10 +62,13 @@ class _Episode:
 
     task: Task
     plan: Plan
-    graph: SceneGraph
-    observation: Observation
+    start: Plan
+    graph: SceneGraph = field(default_factory=lambda: SceneGraph(()))
+    robot_world_m: Vec3 = (0.0, 0.0, 0.0)
+    time_s: float = 0.0
     index: int = 0
     replans: int = 0
+    judged: int = 0
     worked_at: Vec3 | None = None
     bound: dict[str, str] = field(default_factory=dict)
     boundaries: list[BoundaryRecord] = field(default_factory=list)
@@ -75,8 +78,10 @@ class _Episode:
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         started = time.perf_counter()
-        yield
-        self.add(name, time.perf_counter() - started)
+        try:
+            yield
+        finally:
+            self.add(name, time.perf_counter() - started)
 
     def add(self, name: str, seconds: float) -> None:
         self.seconds[name] = self.seconds.get(name, 0.0) + seconds
@@ -124,20 +129,13 @@ class Runtime:
         """
         for listener in self._listeners:
             listener.on_start(task, plan, seed)
-        self._environment.reset(seed)
-        self._perceiver.reset()
-        started = time.perf_counter()
-        observation = self._environment.scan()
-        looked = time.perf_counter()
-        graph = self._perceiver.perceive(observation)
-        episode = _Episode(task, plan, graph, observation)
-        episode.add("observe", looked - started)
-        episode.add("perceive", time.perf_counter() - looked)
-        failures: tuple[str, ...] = ()
+        episode = _Episode(task, plan, start=plan)
+        end, broken = EpisodeEnd.ERROR, None
         try:
+            self._begin(episode, seed)
             end = self._loop(episode)
-        except ForestallError as error:
-            end, failures = EpisodeEnd.ERROR, (f"the run broke off: {error}",)
+        except Exception as error:  # noqa: BLE001 - whatever breaks, what came before is kept
+            broken = error
         record = EpisodeRecord(
             task=task,
             scenario=scenario,
@@ -147,63 +145,82 @@ class Runtime:
             boundaries=tuple(episode.boundaries),
             executed=tuple(episode.executed),
             end=end,
-            failures=failures,
-            simulated_s=self._environment.time_s,
+            success=None if broken is None else False,
+            failures=() if broken is None else (f"the run broke off: {broken}",),
+            simulated_s=episode.time_s,
             compute_s=tuple(sorted(episode.seconds.items())),
             provenance=(*provenance, ("perception", dict(self._perceiver.describe()))),
         )
-        if score is not None:
+        if score is not None and broken is None:
             record = score(record)
         for listener in self._listeners:
             listener.on_end(record)
+        if broken is not None and not isinstance(broken, ForestallError):
+            raise broken
         return record
 
+    def _begin(self, episode: _Episode, seed: int) -> None:
+        """Reset everything and look around once."""
+        self._environment.reset(seed)
+        self._perceiver.reset()
+        with episode.phase("observe"):
+            observation = self._environment.scan()
+        with episode.phase("perceive"):
+            episode.graph = self._perceiver.perceive(observation)
+        episode.robot_world_m = observation.robot_position_world_m
+
     def _loop(self, episode: _Episode) -> EpisodeEnd:
+        context: BoundaryContext | None = None
         while len(episode.executed) < self._config.max_subtasks:
             if episode.index >= len(episode.plan):
-                last = episode.boundaries[-1] if episode.boundaries else None
-                context = self._context(episode, last.subtask if last else None, 1)
-                if context is None or not self._adopt(
-                    episode, self._strategy.after_episode(context)
-                ):
+                if context is None:
                     return EpisodeEnd.PLAN_FINISHED
-                continue
-            context, answer = self._boundary(episode)
+                answer = self._strategy.after_episode(context)
+                if not _asks_for_plan(answer):
+                    return EpisodeEnd.PLAN_FINISHED
+            else:
+                context, answer = self._boundary(episode)
             if answer.decision is Decision.STOP:
                 return EpisodeEnd.STOPPED
-            if self._adopt(episode, answer):
-                continue
-            self._execute(episode, context)
+            if not _asks_for_plan(answer):
+                assert context is not None
+                answer = self._execute(episode, context)
+            if _asks_for_plan(answer):
+                if episode.replans >= self._config.max_replans:
+                    return EpisodeEnd.REPLAN_LIMIT
+                self._adopt(episode, answer)
         return EpisodeEnd.SUBTASK_LIMIT
 
     def _boundary(self, episode: _Episode) -> tuple[BoundaryContext, StrategyAnswer]:
-        """Look towards what the next subtask concerns, perceive, and ask the strategy."""
+        """Look towards what the next subtask concerns, perceive, and ask the strategy.
+
+        Every look is judged and recorded; the looks of one boundary share its index.
+        """
         before = dict(episode.seconds)
         with episode.phase("act"):
             self._approach(episode)
         with episode.phase("observe"):
             observation = self._look(episode)
-        looks = 1
-        while True:
+        for look in range(1, self._config.max_looks + 1):
             with episode.phase("perceive"):
                 episode.graph = self._perceiver.perceive(observation)
-                episode.observation = observation
-                context = self._context(episode, self._ground(episode), looks)
-            assert context is not None
+                episode.robot_world_m = observation.robot_position_world_m
+                context = self._context(episode, observation, look)
             started = time.perf_counter()
             answer = self._strategy.before_subtask(context)
             spent = time.perf_counter() - started
             for name, seconds in answer.seconds:
                 episode.add(name, seconds)
             episode.add("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
-            if answer.decision is not Decision.LOOK_AGAIN or looks >= self._config.max_looks:
+            self._note(episode, context, answer, before)
+            before = dict(episode.seconds)
+            if answer.decision is not Decision.LOOK_AGAIN:
                 break
-            looks += 1
             with episode.phase("observe"):
                 around = self._environment.scan(thorough=True)
                 ahead = self._look(episode)
                 observation = replace(ahead, frames=(*around.frames, *ahead.frames))
-        self._note(episode, context, answer, before)
+        episode.judged += 1
         return context, answer
 
     def _note(
@@ -216,7 +233,7 @@ class Runtime:
         spent = {k: v - before.get(k, 0.0) for k, v in episode.seconds.items()}
         episode.boundaries.append(
             BoundaryRecord(
-                index=len(episode.boundaries),
+                index=episode.judged,
                 subtask=context.subtask,
                 graph=context.graph,
                 scoped=context.scoped,
@@ -230,10 +247,11 @@ class Runtime:
                 time_s=self._environment.time_s,
             )
         )
+        episode.time_s = self._environment.time_s
         for listener in self._listeners:
             listener.on_boundary(context, answer)
 
-    def _execute(self, episode: _Episode, context: BoundaryContext) -> None:
+    def _execute(self, episode: _Episode, context: BoundaryContext) -> StrategyAnswer:
         planned = episode.plan.subtasks[episode.index]
         command = executable(context.subtask, planned, self._vocabulary)
         with episode.phase("act"):
@@ -241,34 +259,28 @@ class Runtime:
         for name in context.subtask.args:
             if is_instance(name):
                 episode.bound[category_of(name)] = name
-        episode.worked_at = outcome.hand_world_m
-        boundary = len(episode.boundaries) - 1
-        episode.executed.append(ExecutedRecord(context.subtask, outcome, boundary))
-        for listener in self._listeners:
-            listener.on_executed(context.subtask, outcome, self._environment.time_s)
-        episode.index += 1
-        self._adopt(episode, self._strategy.after_subtask(context, outcome))
         if outcome.status is SkillStatus.REFUSED:
             episode.bound.clear()
+        episode.worked_at = outcome.hand_world_m
+        episode.time_s = self._environment.time_s
+        episode.executed.append(ExecutedRecord(context.subtask, outcome, episode.judged - 1))
+        for listener in self._listeners:
+            listener.on_executed(context.subtask, outcome, episode.time_s)
+        episode.index += 1
+        return self._strategy.after_subtask(context, outcome)
 
-    def _adopt(self, episode: _Episode, answer: StrategyAnswer) -> bool:
-        if answer.decision is not Decision.REPLAN:
-            return False
-        if answer.replan is None or answer.replan.plan is None:
-            return False
-        if episode.replans >= self._config.max_replans:
-            return False
+    def _adopt(self, episode: _Episode, answer: StrategyAnswer) -> None:
+        assert answer.replan is not None and answer.replan.plan is not None
         episode.plan = answer.replan.plan
         episode.index = 0
         episode.replans += 1
-        return True
 
     def _ground(self, episode: _Episode) -> Subtask:
         return ground_subtask(
             episode.plan.subtasks[episode.index],
             episode.graph,
             self._vocabulary,
-            episode.observation.robot_position_world_m,
+            episode.robot_world_m,
             episode.bound,
         )
 
@@ -300,21 +312,27 @@ class Runtime:
                 points.append(node.centroid_m)
         return self._environment.observe(points)
 
-    def _context(
-        self, episode: _Episode, subtask: Subtask | None, looks: int
-    ) -> BoundaryContext | None:
-        if subtask is None:
-            return None
+    def _context(self, episode: _Episode, observation: Observation, look: int) -> BoundaryContext:
+        subtask = self._ground(episode)
         left = len(episode.plan) - episode.index
         return BoundaryContext(
             task=episode.task,
             plan=episode.plan,
             index=episode.index,
-            done=max(0, len(episode.task.plan) - left),
+            done=max(0, len(episode.start) - left),
             subtask=subtask,
             graph=episode.graph,
             scoped=self._perceiver.scope(episode.graph, subtask),
-            observation=episode.observation,
-            looks=looks,
+            observation=observation,
+            looks=look,
+            may_look=look < self._config.max_looks,
             replans=episode.replans,
         )
+
+
+def _asks_for_plan(answer: StrategyAnswer) -> bool:
+    return (
+        answer.decision is Decision.REPLAN
+        and answer.replan is not None
+        and answer.replan.plan is not None
+    )

@@ -53,7 +53,7 @@ def judge_stored(
     wanted = Subtask.parse(subtask)
     for name in wanted.args:
         vocabulary[name]
-    observation, states = read_observation(folder)
+    observation, states = read_observation(folder, vocabulary)
     perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator(states), vocabulary)
     graph = perceiver.perceive(observation)
     ground = ground_subtask(wanted, graph, vocabulary, observation.robot_position_world_m, {})

@@ -18,7 +18,8 @@ from typing import Any
 import forestall
 from forestall.benchmark.files import load_scenario
 from forestall.build import RunConfig, prepare, run_episode
-from forestall.demonstrations import DEMONSTRATION_SEEDS, ready_made
+from forestall.config import DEMONSTRATION_SEEDS
+from forestall.demonstrations import ready_made
 from forestall.errors import FileFormatError, InputError
 from forestall.memory.store import open_store
 from forestall.report.as_json import record_json

@@ -11,6 +11,7 @@ from forestall.benchmark.files import (
     schemas,
     task_names,
 )
+from forestall.build import RunConfig, prepare
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 
 TASKS = {
@@ -137,3 +138,24 @@ def test_the_schemas_name_every_field() -> None:
     both = schemas()
     assert {"name", "plan", "goal", "scene", "categories"} <= set(both["task"]["properties"])
     assert "faults" in both["scenario"]["properties"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ('kind = "drop"\nstep = "navigate_to_obj(Unicorn)"', "Unicorn"),
+        ('kind = "drop"\nstep = "pour(Mug, Fridge)"', "comes 0 time"),
+        ('kind = "wrong_object"\nstep = "pick_up(Mug)"\nacts_on = "Unicorn"', "Unicorn"),
+        ('kind = "replace_plan"\nplan = ["pick_up(Unicorn)"]', "Unicorn"),
+        ('kind = "add_object"\ncategory = "Unicorn"', "Unicorn"),
+        ('kind = "drop_step"\nstep = "open_obj(Microwave)"', "open_obj"),
+    ],
+)
+def test_what_a_scenario_names_is_checked_before_anything_runs(
+    tmp_path: Path, fault: str, says: str
+) -> None:
+    path = tmp_path / "own.toml"
+    head = 'name = "own"\ntask = "make-coffee"\ntitle = "t"\nkind = "drop"\ncause = "c"\n'
+    path.write_text(f"{head}[[faults]]\n{fault}\n")
+    with pytest.raises(InputError, match=says):
+        prepare(RunConfig("make-coffee", str(path)))

@@ -8,10 +8,9 @@ from forestall.report.derived import (
     moments,
     plan_rows,
     provenance_of,
-    same_step,
 )
 from forestall.types.episode import SkillStatus
-from forestall.types.plan import Plan, Subtask
+from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.verdict import Decision
 
 from . import records

@@ -126,7 +126,7 @@ def test_steps_of_a_repair_are_checked_instead_of_compared(
     assert answer.decision is decision
     assert answer.verdict is not None and answer.verdict.detector == "plan check"
     if not runs:
-        again = proactive.before_subtask(replace(repairing, looks=2))
+        again = proactive.before_subtask(replace(repairing, looks=2, may_look=False))
         assert again.diagnosis is not None
         assert "the microwave is closed" in again.diagnosis.cause
 
@@ -151,7 +151,7 @@ def test_a_cause_whose_repair_does_not_help_is_left_alone(context: BoundaryConte
 def test_one_second_look_then_an_alarm(context: BoundaryContext) -> None:
     proactive = strategy(Parts(Decision.LOOK_AGAIN, (OPEN,)))
     assert proactive.before_subtask(context).decision is Decision.LOOK_AGAIN
-    again = proactive.before_subtask(replace(context, looks=2))
+    again = proactive.before_subtask(replace(context, looks=2, may_look=False))
     assert again.decision is Decision.REPLAN
 
 
@@ -162,6 +162,6 @@ def test_without_a_repair_only_a_plan_that_checks_out_goes_on(
     none = Replan(ReplanOutcome.UNSOLVABLE, note="the place of Mug-1 is not known")
     proactive = strategy(Parts(Decision.REPLAN, (OPEN,), none, runs))
     assert proactive.before_subtask(context).decision is Decision.LOOK_AGAIN
-    answer = proactive.before_subtask(replace(context, looks=2))
+    answer = proactive.before_subtask(replace(context, looks=2, may_look=False))
     assert answer.decision is decision
     assert answer.replan is none

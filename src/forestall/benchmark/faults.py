@@ -26,7 +26,7 @@ from forestall.benchmark.execution_faults import FaultyEnvironment
 from forestall.errors import InputError, UnknownNameError
 from forestall.interfaces import Disturbance, Environment
 from forestall.types.facts import category_of, is_instance
-from forestall.types.plan import SKILLS, Plan, Subtask
+from forestall.types.plan import SKILLS, Plan, Subtask, same_step
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.vocabulary import ATTRIBUTES, Vocabulary, household
 
@@ -249,6 +249,35 @@ def apply_plan_faults(plan: Plan, faults: Iterable[Any]) -> Plan:
         elif isinstance(fault, ReplacePlan):
             steps = [Subtask.parse(s) for s in fault.plan]
     return replace(plan, subtasks=tuple(steps))
+
+
+def check_steps(plan: Plan, faults: Iterable[Any], vocabulary: Vocabulary) -> None:
+    """Check the names in a plan that faults have changed, and that execution faults can happen.
+
+    Raises:
+        InputError: an unknown thing, or a fault of a step that the plan does not have.
+    """
+    for subtask in plan:
+        for name in subtask.args:
+            vocabulary[name]
+    for fault in faults:
+        if not isinstance(fault, Drop | FailedAction | WrongObject | WrongReceptacle):
+            continue
+        step = Subtask.parse(fault.step)
+        for name in (*step.args, *([fault.acts_on] if hasattr(fault, "acts_on") else [])):
+            vocabulary[name]
+        times = sum(
+            same_step(_canonical(s, vocabulary), _canonical(step, vocabulary)) for s in plan
+        )
+        if times < fault.occurrence:
+            raise InputError(
+                f"{fault.kind}.step: {step} comes {times} time(s) in the plan, "
+                f"which has: {', '.join(plan.texts())}"
+            )
+
+
+def _canonical(subtask: Subtask, vocabulary: Vocabulary) -> Subtask:
+    return Subtask(subtask.skill, tuple(vocabulary.canonical(a) for a in subtask.args))
 
 
 def wrap(

@@ -87,7 +87,12 @@ def _memory(
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:
     stamp = time.strftime("%Y%m%d-%H%M%S")
     name = "-".join((task, scenario or "undisturbed", strategy, str(seed), stamp))
-    return Path("runs") / Path(name.replace("/", "_").replace(".toml", ""))
+    folder = Path("runs") / name.replace("/", "_").replace(".toml", "")
+    number = 2
+    while folder.exists():
+        folder = folder.with_name(f"{folder.name.partition('+')[0]}+{number}")
+        number += 1
+    return folder
 
 
 def _summary(data: dict[str, Any]) -> None:
@@ -104,10 +109,11 @@ def _summary(data: dict[str, Any]) -> None:
     for failure in data["failures"]:
         console.print(f"  not reached: {escape(failure)}")
     for alarm in data["alarms"]:
-        score = "none" if alarm["score"] is None else f"{alarm['score']:.2f}"
+        score = "plan check"
+        if alarm["score"] is not None:
+            score = f"score {alarm['score']:.2f} < {alarm['threshold']:.2f}"
         console.print(
-            f"  alarm before {escape(alarm['subtask'])}: score {score} < "
-            f"{alarm['threshold']:.2f}: {escape(alarm['cause'] or '')}",
+            f"  alarm before {escape(alarm['subtask'])}: {score}: {escape(alarm['cause'] or '')}",
             soft_wrap=True,
         )
     console.print(

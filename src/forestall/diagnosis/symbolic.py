@@ -16,6 +16,14 @@ from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, Precondition, Reference, Verdict, Violation
 from forestall.vocabulary import ATTRIBUTES, Vocabulary
 
+_UNDONE = {
+    "open_obj": Literal("open", ("?target",), "closed"),
+    "close_obj": Literal("open", ("?target",), "open"),
+    "toggle_on": Literal("toggled", ("?target",), "off"),
+    "toggle_off": Literal("toggled", ("?target",), "on"),
+}
+"""Skill → the state that it ends."""
+
 
 class Miner(Protocol):
     """Mines what held before a subtask in its references, lifted to ?object and ?target."""
@@ -61,7 +69,9 @@ class SymbolicReasoner:
         broken = [
             v
             for v in self.violations(preconditions, graph, subtask)
-            if v.truth is Truth.FALSE and _concerns(v, self.vocabulary)
+            if v.truth is Truth.FALSE
+            and _concerns(v, self.vocabulary)
+            and not _is_the_effect(v.precondition.literal, subtask)
         ]
         if not broken:
             count = len(context.references)
@@ -87,6 +97,14 @@ class SymbolicReasoner:
 
     def _nothing(self, cause: str) -> Diagnosis:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
+
+
+def _is_the_effect(literal: Literal, subtask: Subtask) -> bool:
+    """Whether a fact is violated only because what the subtask is to bring about holds already.
+
+    That a door was closed before it was opened is no need of opening it.
+    """
+    return literal == _UNDONE.get(subtask.skill)
 
 
 def _ids(graph: SceneGraph, name: str) -> tuple[str, ...]:

@@ -8,21 +8,22 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from forestall.types.demonstration import Demonstration, DemonstrationStep
-from forestall.types.episode import EpisodeRecord
+from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
 from forestall.types.observation import Rgb
 
 
 def demonstration_from(
     record: EpisodeRecord, version: str, keep_image: Callable[[Rgb], str] | None = None
 ) -> Demonstration | None:
-    """The demonstration of a record, None when the run did not succeed.
+    """The demonstration of a record, None when the run or one of its steps did not succeed.
 
     Args:
         record: a scored run of an undisturbed task.
         version: of the software, for the store.
         keep_image: stores a picture and returns its content hash; None keeps no pictures.
     """
-    if not record.success:
+    smooth = all(e.outcome.status is SkillStatus.SUCCEEDED for e in record.executed)
+    if not (record.success and smooth and record.end is EpisodeEnd.PLAN_FINISHED):
         return None
     perception = dict(record.provenance).get("perception", {})
     return Demonstration(

@@ -18,7 +18,7 @@ from forestall.types.episode import (
     SkillStatus,
 )
 from forestall.types.facts import category_of
-from forestall.types.plan import Plan, Subtask
+from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import Decision, Replan, ReplanOutcome
 
@@ -196,15 +196,6 @@ def adopted(boundary: BoundaryRecord, executed: Sequence[ExecutedRecord]) -> Pla
 def replans(record: EpisodeRecord) -> int:
     """How many plans were replaced during the run."""
     return sum(adopted(b, record.executed) is not None for b in record.boundaries)
-
-
-def same_step(a: Subtask, b: Subtask) -> bool:
-    """Whether two subtasks are the same up to naming an instance or only its category."""
-    return a.skill == b.skill and all(
-        x == y
-        or (category_of(x) == category_of(y) and (x == category_of(x) or y == category_of(y)))
-        for x, y in zip(a.args, b.args, strict=True)
-    )
 
 
 def moments(record: EpisodeRecord) -> tuple[Moment, ...]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.types.episode import SkillOutcome
 from forestall.types.facts import Literal
-from forestall.types.plan import Plan
+from forestall.types.plan import Plan, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import (
     Calibration,
@@ -90,7 +90,7 @@ class Proactive:
         context = replace(context, references=references)
         verdict = self._detector.judge(context.scoped, context.observation, references)
         clock.lap("compare")
-        if verdict.decision is Decision.LOOK_AGAIN and context.looks == 1:
+        if verdict.decision is Decision.LOOK_AGAIN and context.may_look:
             return StrategyAnswer(Decision.LOOK_AGAIN, verdict, seconds=clock.items())
         if verdict.decision is Decision.PROCEED:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
@@ -114,7 +114,7 @@ class Proactive:
         )
         if check.ok:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
-        if context.looks == 1:
+        if context.may_look:
             return StrategyAnswer(
                 Decision.LOOK_AGAIN, verdict, why=check.reason, seconds=clock.items()
             )
@@ -145,11 +145,11 @@ class Proactive:
         clock.lap("replan")
         if replan.outcome is ReplanOutcome.SOLVED and replan.plan is not None:
             self._attempts[key] = self._attempts.get(key, 0) + 1
-            self._resume_left = _common_suffix(replan.plan, context)
+            self._resume_left = min(self._resume_left, _common_suffix(replan.plan, context))
             return StrategyAnswer(
                 Decision.REPLAN, verdict, diagnosis, replan, diagnosis.cause, clock.items()
             )
-        if context.looks == 1:
+        if context.may_look:
             return StrategyAnswer(
                 Decision.LOOK_AGAIN, verdict, diagnosis, replan, replan.note, clock.items()
             )
@@ -194,7 +194,7 @@ def _common_suffix(plan: Plan, context: BoundaryContext) -> int:
     """How many subtasks at the end of a corrected plan are the old plan's own."""
     same = 0
     for new, old in zip(reversed(plan.subtasks), reversed(context.remaining()), strict=False):
-        if new != old:
+        if not same_step(new, old):
             break
         same += 1
     return same

@@ -73,7 +73,7 @@ class EpisodeEnd(Enum):
 
     PLAN_FINISHED = "plan finished"
     SUBTASK_LIMIT = "subtask limit"
-    REPLAN_LIMIT = "replan limit"
+    REPLAN_LIMIT = "replan limit"  # a further plan was asked for than may be adopted
     STOPPED = "stopped safely"
     ERROR = "error"
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from forestall.errors import InputError, UnknownNameError
+from forestall.types.facts import category_of
 
 SKILLS: dict[str, tuple[str, ...]] = {
     "navigate_to_obj": ("target",),
@@ -65,6 +66,15 @@ class Subtask:
     def words(self) -> str:
         """The subtask as a phrase: "put in Plate Microwave"."""
         return " ".join((self.skill.removesuffix("_obj").replace("_", " "), *self.args))
+
+
+def same_step(a: Subtask, b: Subtask) -> bool:
+    """Whether two subtasks are the same up to naming an instance or only its category."""
+    return a.skill == b.skill and all(
+        x == y
+        or (category_of(x) == category_of(y) and (x == category_of(x) or y == category_of(y)))
+        for x, y in zip(a.args, b.args, strict=True)
+    )
 
 
 @dataclass(frozen=True, slots=True)

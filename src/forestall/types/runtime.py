@@ -19,14 +19,15 @@ class BoundaryContext:
         task: the task with its goal.
         plan: the plan being executed.
         index: index in `plan` of the subtask that comes next.
-        done: how far the task has come, as a position in its nominal plan (a repair keeps the
-            position at which the plan will be taken up again).
+        done: how far the task has come, as a position in the plan that the run started with,
+            counted from its end (during a repair it is lower by what the repair adds).
         subtask: that subtask, grounded to instance names where they are known.
         graph: the whole fused scene graph.
         scoped: the part that concerns the subtask.
         observation: the newest observation.
         references: retrieved demonstrations (filled by strategies that use them).
         looks: how many times the robot looked at this boundary (1 at first).
+        may_look: whether it may look once more.
         replans: how many plans were made in this episode so far.
     """
 
@@ -40,6 +41,7 @@ class BoundaryContext:
     observation: Observation
     references: tuple[Reference, ...] = ()
     looks: int = 1
+    may_look: bool = True
     replans: int = 0
 
     def remaining(self) -> tuple[Subtask, ...]:
