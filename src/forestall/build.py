@@ -30,7 +30,8 @@ from forestall.config import DEMONSTRATION_SEEDS
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.envs.kitchen.environment import KitchenEnvironment
-from forestall.errors import InputError
+from forestall.envs.kitchen.rendering import RENDERERS
+from forestall.errors import InputError, UnknownNameError
 from forestall.interfaces import Listener, Strategy
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.perception.perceiver import GraphPerceiver
@@ -42,6 +43,9 @@ from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Plan
 from forestall.vocabulary import Vocabulary
+
+RUN_STATES = tuple(n for n in known("states") if n != "given")
+"""Where a run's object states may come from; given ones belong to stored observations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +104,11 @@ def prepare(config: RunConfig) -> Prepared:
     """
     loaded = load_task(config.task)
     load("strategy", config.strategy)
+    if config.states not in RUN_STATES:
+        raise UnknownNameError("states of a run", config.states, RUN_STATES)
+    load("segmenter", config.segmenter)
+    if config.renderer not in RENDERERS:
+        raise UnknownNameError("renderer", config.renderer, RENDERERS)
     scenario = None if config.scenario is None else load_scenario(config.scenario)
     if scenario is not None and scenario.task != loaded.task.name:
         raise InputError(
@@ -215,11 +224,6 @@ def _state_estimator(name: str, kitchen: KitchenEnvironment) -> Any:
     kind = load("states", name)
     if name == "oracle":
         return kind(kitchen.oracle.states)
-    if name == "given":
-        raise InputError(
-            f"states 'given' come with a stored observation; a run takes one of: "
-            f"{', '.join(n for n in known('states') if n != 'given')}"
-        )
     return kind()
 
 

@@ -99,11 +99,15 @@ def record_all(
         return
     with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("spawn")) as pool:
         futures = {pool.submit(record_one, job): job for job in jobs}
-        for future in as_completed(futures):
-            future.result()
-            done(futures[future])
-        for future in futures:
-            yield future.result()
+        try:
+            for future in as_completed(futures):
+                future.result()
+                done(futures[future])
+            for future in futures:
+                yield future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def ready_made(

@@ -3,8 +3,7 @@
 ForestallError
 ├── InputError             what the user gave is not valid; one line that says what would be
 │   ├── UnknownNameError   a name that is not known, with the nearest known ones
-│   ├── FileFormatError    a file that cannot be read as what it should be
-│   └── MissingExtraError  an optional dependency is not installed
+│   └── FileFormatError    a file that cannot be read as what it should be
 ├── MemoryFileError        the demonstration file is empty, of another version, damaged or locked
 ├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
 └── PerceptionError        an observation that cannot be used (NaN depth, wrong shapes)
@@ -35,23 +34,21 @@ class UnknownNameError(InputError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         options = sorted(known)
-        near = difflib.get_close_matches(name, options, n=3, cutoff=0.5)
-        hint = f"did you mean {' or '.join(near)}? " if near else ""
-        super().__init__(f"unknown {kind} {name!r}: {hint}known: {', '.join(options) or 'none'}")
+        near = difflib.get_close_matches(name, options, n=3, cutoff=0.6)
+        meant = f"did you mean {' or '.join(near)}?" if near else ""
+        if not near or len(options) <= 20:
+            meant = f"{meant} known: {', '.join(options) or 'none'}".strip()
+        super().__init__(f"unknown {kind} {name!r}: {meant}")
         self.kind = kind
         self.name = name
         self.known = tuple(options)
 
+    def __reduce__(self) -> tuple[type, tuple[str, str, tuple[str, ...]]]:
+        return (type(self), (self.kind, self.name, self.known))
+
 
 class FileFormatError(InputError):
     """A file that cannot be read as what it should be."""
-
-
-class MissingExtraError(InputError):
-    """An optional dependency is not installed."""
-
-    def __init__(self, feature: str, extra: str) -> None:
-        super().__init__(f"{feature} needs an extra: pip install 'forestall[{extra}]'")
 
 
 class MemoryFileError(ForestallError):

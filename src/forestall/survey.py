@@ -102,12 +102,16 @@ def survey(
         ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
     ):
         futures = {pool.submit(run_job, job): job for job in todo}
-        for done, future in enumerate(as_completed(futures), len(jobs) - len(todo) + 1):
-            job = futures[future]
-            rows[job.key] = future.result()
-            lines.write(json.dumps({"key": job.key, "row": rows[job.key]}) + "\n")
-            lines.flush()
-            progress(done, len(jobs), job.scenario or job.task)
+        try:
+            for done, future in enumerate(as_completed(futures), len(jobs) - len(todo) + 1):
+                job = futures[future]
+                rows[job.key] = future.result()
+                lines.write(json.dumps({"key": job.key, "row": rows[job.key]}) + "\n")
+                lines.flush()
+                progress(done, len(jobs), job.scenario or job.task)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return [rows[j.key] for j in jobs]
 
 

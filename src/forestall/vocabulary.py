@@ -30,6 +30,22 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {
 """Attribute → its values; the first is the default of a new object."""
 
 
+SHAPES = (
+    "box",
+    "bottle",
+    "cylinder",
+    "dish",
+    "egg_cracked",
+    "ellipsoid",
+    "hinged",
+    "knife",
+    "plant",
+    "slab",
+    "vessel",
+)
+"""Shapes that the household can build from a size."""
+
+
 @dataclass(frozen=True, slots=True)
 class Receptacle:
     """How a category takes other things.
@@ -100,8 +116,8 @@ class Category:
     cracks_into: str | None = None
     drains: bool = False  # liquid poured into it is gone
     controls: str | None = None  # a knob: category that it turns on and off, same number
-    large: bool = False  # fills a plate on its own
-    fragile: bool = False  # breaks when dropped
+    fragile: bool = False  # breaks when dropped hard
+    fits: tuple[str, ...] = ()  # further receptacles that take it, for categories of task files
     shape: Mapping[str, Any] = field(default_factory=dict, hash=False)
     defaults: tuple[tuple[str, str], ...] = ()
     aliases: tuple[str, ...] = ()
@@ -150,7 +166,9 @@ class Vocabulary:
         item = self[thing]
         if r is None or item.name in r.refuses or item.name == self[receptacle].name:
             return False
-        return item.name in r.accepts or ("*" in r.accepts and item.pickupable)
+        if item.name in r.accepts or self[receptacle].name in item.fits:
+            return True
+        return "*" in r.accepts and item.pickupable
 
     def default_states(self, name: str) -> dict[str, str]:
         """Attribute → value of a new object."""
@@ -213,8 +231,14 @@ def parse_category(name: str, data: Mapping[str, Any]) -> Category:
             k: tuple(v) if isinstance(v, list) else v for k, v in device.items()
         }
         device = Device(**values)
+    kind = fields.get("shape", {}).get("kind", SHAPES[0])
+    if kind not in SHAPES:
+        raise UnknownNameError(f"shape of {name}", kind, SHAPES)
+    for flag in ("pickupable", "fixture", "food", "drains", "fragile"):
+        if not isinstance(fields.get(flag, False), bool):
+            raise InputError(f"category {name}: {flag} must be true or false")
     lists: dict[str, Any] = {
-        k: tuple(fields.pop(k)) for k in ("attributes", "aliases") if k in fields
+        k: tuple(fields.pop(k)) for k in ("attributes", "aliases", "fits") if k in fields
     }
     return Category(
         name=name, defaults=defaults, receptacle=receptacle, device=device, **lists, **fields

@@ -275,3 +275,13 @@ def test_errors_of_unknown_names_carry_the_known_ones():
     with pytest.raises(UnknownNameError) as caught:
         _scene(kind="remove_object", object="Mugg")
     assert "Mug" in caught.value.known
+
+
+def test_drop_at_a_placing_step_comes_before_the_hand_lets_go():
+    inner, _, outcomes = _run(
+        {"kind": "drop", "step": "put_in(Mug, Sink)"}, steps=["pick_up(Mug)", "put_in(Mug, Sink)"]
+    )
+    assert [o.status for o in outcomes] == [SkillStatus.SUCCEEDED, SkillStatus.REFUSED]
+    assert [str(r) for r in inner.oracle.truth().relations if r.subject == "Mug-1"] == [
+        "Mug-1 on top of Floor-1"
+    ]

@@ -243,3 +243,13 @@ def test_a_frame_with_depth_that_is_not_a_number_cannot_be_made() -> None:
     depth[0, 0] = np.nan
     with pytest.raises(PerceptionError, match="NaN"):
         Frame(bare.frames[0].rgb, depth, bare.frames[0].intrinsics, POSE)
+
+
+def test_two_detections_may_not_share_a_mask(folder: Path) -> None:
+    def change(data: dict) -> None:
+        first, second = data["frames"][0]["detections"][:2]
+        second["id"] = first["id"]
+
+    edit(folder, change)
+    with pytest.raises(FileFormatError, match="belongs to another detection"):
+        read_observation(folder)

@@ -83,11 +83,20 @@ class FaultyEnvironment:
                 command = self._misled(command, fault)
             if fault.kind != "drop":
                 self._done[index] += 1
+        lets_go = command.skill in ("put_on", "put_in")
+        if lets_go:
+            self._inner.approach(command.args[-1])
+            self._drop(due)
         outcome = self._pretend(command) if silent else self._inner.execute(command)
+        if not lets_go:
+            self._drop(due)
+        return outcome
+
+    def _drop(self, due: Sequence[int]) -> None:
+        """Lose what is held: on the way for a placing subtask, else after it."""
         for index in due:
             if self._faults[index].kind == "drop" and self._disturbance.drop_held() is not None:
                 self._done[index] += 1
-        return outcome
 
     @property
     def time_s(self) -> float:

@@ -66,9 +66,9 @@ def speed(
 @bench.command
 def episodes(
     *,
-    task: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    scenario: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    strategy: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    scenario: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    strategy: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     seeds: str = "100:105",
     memory: Path | None = None,
     states: str = "oracle",
@@ -93,8 +93,11 @@ def episodes(
     """
     from forestall.benchmark.files import scenario_names, task_names
     from forestall.cli.progress import bar
+    from forestall.errors import InputError
     from forestall.survey import jobs_for, parse_seeds, survey, table
 
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}: at least 1 is needed")
     scenarios = list(scenario_names()) if scenario == ["all"] else scenario or []
     tasks = task or ([] if scenarios else list(task_names()))
     todo = jobs_for(

@@ -24,7 +24,7 @@ def record(
     memory: Path,
     /,
     *,
-    task: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     kitchens: int = 4,
     seed: int = 1_000_000,
     states: str = "oracle",
@@ -50,6 +50,8 @@ def record(
 
     if kitchens < 1:
         raise InputError(f"--kitchens {kitchens}: at least 1 is needed")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}: at least 1 is needed")
     names = task or list(task_names())
     for name in names:
         load_task(name)

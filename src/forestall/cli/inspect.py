@@ -86,7 +86,10 @@ def check(
     threshold: float = 0.9,
     as_json: Json = False,
 ) -> int:
-    """Judge a stored observation of your own before a subtask; exit code 1 on an alarm.
+    """Judge a stored observation of your own before a subtask.
+
+    Exit code 0: it fits; 1: an alarm; 4: it could not be judged (no demonstration to compare with,
+    or something that is needed is not in view).
 
     Args:
         folder: the observation (docs/observation-format.md).
@@ -115,7 +118,8 @@ def check(
     if as_json:
         print(json.dumps(data, indent=2))
     else:
-        print(f"{verdict.decision.value}: before {graph.subtask}")
+        judged = "not judged" if verdict.score is None else verdict.decision.value
+        print(f"{judged}: before {graph.subtask}")
         score = "none" if verdict.score is None else f"{verdict.score:.3f}"
         print(f"  score {score}, threshold {threshold:.2f}, {verdict.references} references")
         if verdict.note:
@@ -126,7 +130,9 @@ def check(
             print(f"  cause: {diagnosis.cause}")
             for fact in diagnosis.must_change:
                 print(f"  must change: {fact}")
-    return 1 if verdict.decision is Decision.REPLAN else 0
+    if verdict.decision is Decision.REPLAN:
+        return 1
+    return 0 if verdict.decision is Decision.PROCEED and verdict.score is not None else 4
 
 
 def _verdict_json(verdict: Verdict, diagnosis: Diagnosis | None) -> dict[str, Any]:

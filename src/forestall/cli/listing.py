@@ -89,7 +89,8 @@ def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
 
     table = Table(box=None, pad_edge=False)
     for number, name in enumerate(header):
-        table.add_column(name, no_wrap=number == 0, style="bold" if number == 0 else None)
+        short = all(len(row[number]) <= 16 for row in rows)
+        table.add_column(name, no_wrap=short, style="bold" if number == 0 else None)
     for row in rows:
         table.add_row(*row)
     console = Console()

@@ -1,7 +1,8 @@
 """Entry point of the `forestall` command.
 
 Exit codes: 0 done, and for a run: the task succeeded; 1 the run ended and the task failed, or a
-check raised an alarm; 2 the input was not valid; 3 something else that forestall names.
+check raised an alarm; 2 the input was not valid; 3 something else that forestall names (a damaged
+memory, a full disk); 4 a check that could not be judged; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ app = App(
     name="forestall",
     help="See a failing subtask coming, explain it, replan, succeed.",
     version=forestall.__version__,
+    suppress_keyboard_interrupt=False,
 )
 for command in (run, tasks, scenarios, check, compare, doctor):
     app.command(command)
@@ -51,6 +53,8 @@ def call(arguments: Sequence[str] | None = None) -> int:
         return _fail("interrupted", 130)
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        return _fail(str(error), 3)
     return code if isinstance(code, int) else 0
 
 

@@ -40,7 +40,7 @@ def run(
         seed: of the scene.
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         memory: a demonstration file; the ready-made one by default.
-        states: where object states come from: oracle (the simulator's, for ablation).
+        states: where object states come from: oracle (the simulator's).
         renderer: auto, embree, rays or gl.
         threshold: alarm when no demonstration reaches this score.
         as_json: print one record as JSON and nothing else on standard output.
@@ -53,12 +53,14 @@ def run(
 
     config = RunConfig(task, scenario, strategy, seed, renderer, states=states, threshold=threshold)
     prepared = prepare(config)
-    folder = out or _new_folder(prepared.loaded.task.name, scenario, strategy, seed)
+    name = None if prepared.scenario is None else prepared.scenario.name
+    folder = out or _new_folder(prepared.loaded.task.name, name, strategy, seed)
+    folder.mkdir(parents=True, exist_ok=True)
     demonstrations, used = _memory(task, strategy, memory, states, quiet)
     page = folder / "index.html"
     recorder = RunRecorder(
         folder,
-        scenario=None if prepared.scenario is None else prepared.scenario.name,
+        scenario=name,
         strategy=strategy,
         provenance={**dict(provenance(config)), "memory": used},
         page=str(page),
@@ -74,6 +76,10 @@ def run(
     return 0 if record.success else 1
 
 
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def _memory(
     task: str, strategy: str, memory: Path | None, states: str, quiet: bool
 ) -> tuple[list[Demonstration] | None, str | None]:
@@ -86,8 +92,7 @@ def _memory(
 
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:
     stamp = time.strftime("%Y%m%d-%H%M%S")
-    name = "-".join((task, scenario or "undisturbed", strategy, str(seed), stamp))
-    folder = Path("runs") / name.replace("/", "_").replace(".toml", "")
+    folder = Path("runs") / "-".join((task, scenario or "undisturbed", strategy, str(seed), stamp))
     number = 2
     while folder.exists():
         folder = folder.with_name(f"{folder.name.partition('+')[0]}+{number}")
@@ -117,7 +122,7 @@ def _summary(data: dict[str, Any]) -> None:
             soft_wrap=True,
         )
     console.print(
-        f"  {len(data['executed'])} subtasks, {data['replans']} replans, "
+        f"  {len(data['executed'])} subtasks, {_count(data['replans'], 'new plan')}, "
         f"{data['simulated_s']:.0f} s of robot time, {data['reasoning_s']:.1f} s of reasoning; "
         f"states: {escape(str(data['perception']['state_estimator']))}",
         soft_wrap=True,

@@ -140,6 +140,7 @@ def _frame(
     camera = data.intrinsics
     masks = MaskFile.open(folder, data.masks, depth.shape)
     detections: list[Detection] = []
+    used: set[int | str | None] = set()
     for number, given in enumerate(data.detections):
         where = f"{folder / OBSERVATION_FILE}: frames.{index}.detections.{number}"
         category = vocabulary[given.category].name
@@ -156,6 +157,10 @@ def _frame(
             if instance is None:
                 raise FileFormatError(f"{where}: states need an instance, for example {category}-1")
             states.setdefault(instance, {}).update(_states(given.states, category, vocabulary))
+        source = given.id if given.id is not None else given.mask
+        if source in used:
+            raise FileFormatError(f"{where}: mask {source!r} belongs to another detection already")
+        used.add(source)
         mask = _mask(folder, given, masks, where, depth.shape)
         detections.append(Detection(category, mask, instance, given.score))
     return Frame(
