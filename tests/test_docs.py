@@ -1,0 +1,48 @@
+"""The documents: examples work, and every path and command that they name exists."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from forestall.build import RunConfig, prepare
+from forestall.cli.main import app
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+PATH = re.compile(r"`([\w./-]+\.(?:py|md|toml|jsonl?|jinja))`|\]\(([\w./-]+)\)")
+MADE_BY_USERS = {
+    "observation.json", "record.json", "boundaries.jsonl", "runs/episodes.jsonl", "ladle-lost.toml",
+    "fetch-ladle.toml",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+def test_every_path_exists(document: Path) -> None:
+    named = {a or b for a, b in PATH.findall(document.read_text(encoding="utf-8"))}
+    bases = (document.parent, ROOT, ROOT / "src" / "forestall")
+    gone = [
+        n
+        for n in sorted(named - MADE_BY_USERS)
+        if not any((base / n).exists() for base in bases)
+        and not list((ROOT / "src" / "forestall").rglob(n))
+    ]
+    assert not gone
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+def test_every_command_exists(document: Path) -> None:
+    text = document.read_text(encoding="utf-8")
+    known = {name for name in app if not name.startswith("-")}
+    named = set(re.findall(r"\bforestall ([a-z]+)\b", text.replace("`forestall`", "")))
+    prose = {"stops", "speaks", "record"}
+    assert named - prose <= known
+
+
+def test_the_example_files_are_valid(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "task-format.md").read_text(encoding="utf-8")
+    task, scenario = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "task.toml").write_text(task)
+    (tmp_path / "scenario.toml").write_text(scenario)
+    config = RunConfig(str(tmp_path / "task.toml"), str(tmp_path / "scenario.toml"))
+    assert prepare(config).loaded.task.name == "fetch-ladle"
