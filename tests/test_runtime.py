@@ -23,10 +23,10 @@ from forestall.perception.scope import scope
 from forestall.runtime import Runtime, RuntimeConfig
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
-from forestall.types.graph import SceneGraph
+from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
-from forestall.types.verdict import Decision
+from forestall.types.verdict import Decision, ReplanOutcome
 from forestall.vocabulary import Vocabulary
 
 ON_FLAT_WORLDS = sorted(set(scenario_names()) - {"knife-blocked"})
@@ -57,6 +57,7 @@ def play(
     config: RunConfig,
     demonstrations: list[Demonstration] | None = None,
     limits: RuntimeConfig | None = None,
+    perceiver: type[TruthPerceiver] = TruthPerceiver,
 ) -> EpisodeRecord:
     loaded = load_task(config.task)
     faults = () if config.scenario is None else load_scenario(config.scenario).faults
@@ -69,7 +70,7 @@ def play(
 
     runtime = Runtime(
         wrap(kitchen, faults, kitchen, loaded.vocabulary),
-        TruthPerceiver(kitchen, loaded.vocabulary),
+        perceiver(kitchen, loaded.vocabulary),
         make_strategy(config, loaded.vocabulary, demonstrations),
         loaded.vocabulary,
         config=limits,
@@ -169,3 +170,42 @@ def test_an_error_in_the_middle_is_recorded() -> None:
     assert record.end is EpisodeEnd.ERROR
     assert record.failures == ("the run broke off: the camera is gone",)
     assert len(record.executed) == len(record.boundaries) == 2
+
+
+class Forgetful(TruthPerceiver):
+    """Loses sight of a mug that lies on the floor."""
+
+    def perceive(self, observation: Observation) -> SceneGraph:
+        graph = super().perceive(observation)
+        if "Floor-1" not in graph.parents("Mug-1"):
+            return graph
+        return SceneGraph(
+            tuple(
+                replace(n, centroid_m=None, box_m=None, seen=Seen.UNOBSERVED)
+                if n.id == "Mug-1"
+                else n
+                for n in graph.nodes
+            ),
+            tuple(r for r in graph.relations if "Mug-1" not in (r.subject, r.object)),
+        )
+
+
+def test_a_lost_thing_is_looked_for_and_then_the_run_stops_safely() -> None:
+    record = play(RunConfig("make-coffee", "mug-dropped", seed=3), memory(), perceiver=Forgetful)
+    assert record.end is EpisodeEnd.STOPPED
+    assert record.success is False
+    first, second = record.boundaries[-2:]
+    assert (first.looks, second.looks) == (1, 2)
+    assert first.index == second.index
+    assert second.replan is not None
+    assert second.replan.outcome is ReplanOutcome.UNSOLVABLE
+    assert "Mug-1" in second.replan.note
+    assert "stopped" in second.why
+
+
+def test_without_a_near_reference_nothing_is_claimed() -> None:
+    others = [d for d in memory() if d.task == "switch-devices"]
+    record = play(RunConfig("make-coffee", seed=3), others)
+    assert record.success
+    assert all(b.verdict is not None and b.verdict.score is None for b in record.boundaries)
+    assert all("nothing was judged" in b.verdict.note for b in record.boundaries if b.verdict)

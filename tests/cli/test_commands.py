@@ -86,6 +86,32 @@ def test_wrong_input_is_one_clear_line(
     assert says in printed.err
 
 
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(b"", "empty"), (b"hello, this is no database at all" * 9, "SQLite"), (None, "memory.db")],
+)
+def test_a_memory_that_cannot_be_used_ends_a_run_before_it_starts(
+    content: bytes | None, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    memory = tmp_path / "memory.db"
+    if content is not None:
+        memory.write_bytes(content)
+    out = tmp_path / "run"
+    assert call(["run", "toast-bread", "--memory", str(memory), "--out", str(out)]) == 3
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.count("\n") == 1
+    assert says in printed.err
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("x")
+    out = tmp_path / "file" / "run"
+    assert call(["run", "toast-bread", "--strategy", "none", "--out", str(out)]) == 3
+    assert capsys.readouterr().err.count("\n") == 1
+
+
 def test_a_dangling_relation_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.json"
     data = json.loads(Path(graph_file(tmp_path, "ok.json", bowl=True)).read_text())
