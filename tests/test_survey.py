@@ -16,7 +16,7 @@ def row(job: Job, success: bool, alarms: int = 0) -> dict[str, object]:
         "strategy": job.strategy,
         "success": success,
         "boundaries": 10,
-        "alarms": [{}] * alarms,
+        "alarms": [{"index": k} for k in range(alarms)],
         "replans": 0,
     }
 

@@ -133,7 +133,7 @@ def run_job(job: Job) -> dict[str, Any]:
         asdict(job)
         | {name: data[name] for name in kept}
         | {
-            "boundaries": len(record.boundaries),
+            "boundaries": len({b.index for b in record.boundaries}),
             "executed": len(record.executed),
             "alarms": data["alarms"],
             "perception": data["perception"],
@@ -166,7 +166,7 @@ def table(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                 "low": float(interval.low),
                 "high": float(interval.high),
                 "boundaries": sum(r["boundaries"] for r in group),
-                "alarms": sum(len(r["alarms"]) for r in group),
+                "alarms": sum(len({a["index"] for a in r["alarms"]}) for r in group),
                 "runs_with_alarm": sum(bool(r["alarms"]) for r in group),
                 "replans": sum(r["replans"] for r in group),
             }

@@ -115,6 +115,7 @@ class Proactive:
         if check.ok:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
         if context.may_look:
+            verdict = replace(verdict, decision=Decision.LOOK_AGAIN)
             return StrategyAnswer(
                 Decision.LOOK_AGAIN, verdict, why=check.reason, seconds=clock.items()
             )
