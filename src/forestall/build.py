@@ -11,7 +11,7 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import forestall
@@ -24,7 +24,7 @@ from forestall.benchmark.faults import (
 )
 from forestall.benchmark.files import LoadedTask, Scenario, load_scenario, load_task
 from forestall.benchmark.goals import TruthGoalChecker
-from forestall.comparison.preconditions import mine, violations
+from forestall.comparison.preconditions import MiningConfig, mine, violations
 from forestall.comparison.score import BatchScorer, ScoreConfig
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
@@ -33,8 +33,10 @@ from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.envs.kitchen.rendering import RENDERERS
 from forestall.errors import InputError, UnknownNameError
 from forestall.interfaces import Listener, Strategy
-from forestall.memory.retrieval import EmbeddingRetriever
+from forestall.memory.retrieval import EmbeddingRetriever, RetrievalConfig
+from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.perceiver import GraphPerceiver
+from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator
 from forestall.registry import known, load
 from forestall.replanning.symbolic import PlannerReplanner
@@ -43,6 +45,17 @@ from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Plan
 from forestall.vocabulary import Vocabulary
+
+OPTIONS = (
+    MiningConfig(),
+    PerceptionConfig(),
+    RetrievalConfig(),
+    RuntimeConfig(),
+    ScopeConfig(),
+    ScoreConfig(),
+    SearchConfig(),
+)
+"""Every part's options as runs use them; they go into the record."""
 
 RUN_STATES = tuple(n for n in known("states") if n != "given")
 """Where a run's object states may come from; given ones belong to stored observations."""
@@ -167,7 +180,12 @@ def run_episode(
             config.seed,
             None if prepared.scenario is None else prepared.scenario.name,
             _scorer(kitchen),
-            (*provenance(config), ("memory", memory)),
+            (
+                *provenance(config),
+                ("memory", memory),
+                ("demonstrations", [{"id": d.id, "seed": d.seed} for d in demonstrations or ()]),
+                ("inputs", {"task": repr(loaded.task), "scenario": repr(prepared.scenario)}),
+            ),
         )
     finally:
         kitchen.close()
@@ -205,19 +223,27 @@ def make_detector(config: RunConfig, vocabulary: Vocabulary) -> SceneGraphDetect
 
 def provenance(config: RunConfig) -> tuple[tuple[str, Any], ...]:
     """What is needed to run the same again."""
+    packages = ("numpy", "scipy", "mujoco-core", "embreex")
     return (
         ("config", asdict(config)),
+        ("options", {type(o).__name__: asdict(o) for o in OPTIONS}),
         (
             "versions",
             {
                 "forestall": forestall.__version__,
                 "python": sys.version.split()[0],
-                "numpy": version("numpy"),
-                "mujoco": version("mujoco-core"),
+                **{name: _version(name) for name in packages},
                 "platform": platform.platform(),
             },
         ),
     )
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 def _state_estimator(name: str, kitchen: KitchenEnvironment) -> Any:
