@@ -263,9 +263,9 @@ class Runtime:
             episode.bound.clear()
         episode.worked_at = outcome.hand_world_m
         episode.time_s = self._environment.time_s
-        episode.executed.append(ExecutedRecord(context.subtask, outcome, episode.judged - 1))
+        episode.executed.append(ExecutedRecord(command, outcome, episode.judged - 1))
         for listener in self._listeners:
-            listener.on_executed(context.subtask, outcome, episode.time_s)
+            listener.on_executed(command, outcome, episode.time_s)
         episode.index += 1
         return self._strategy.after_subtask(context, outcome)
 

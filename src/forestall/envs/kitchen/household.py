@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 from forestall.errors import UnknownNameError
 from forestall.interfaces import World
 from forestall.types.episode import Event
-from forestall.types.facts import GRIPPER, Literal, category_of
+from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Vec3
 from forestall.vocabulary import ATTRIBUTES, Category, Vocabulary
@@ -113,6 +113,13 @@ class Household:
     def gone(self, name: str) -> str | None:
         """What became of an instance that was replaced, in words; None if it never was."""
         return self._gone.get(name)
+
+    def is_any_support(self, name: str) -> bool:
+        """Whether a name is a category of supports of which any will do ("CounterTop")."""
+        kind = self.vocabulary.find(name)
+        if kind is None or is_instance(name) or not kind.fixture or kind.receptacle is None:
+            return False
+        return kind.receptacle.relation == "on_top_of" and kind.receptacle.capacity is None
 
     def category(self, name: str) -> Category:
         """The category of an instance."""

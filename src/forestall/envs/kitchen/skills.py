@@ -102,8 +102,12 @@ def perform(robot: Robot, subtask: Subtask) -> SkillOutcome:
 
 
 def navigate_to_obj(robot: Robot, target: str) -> str:
-    """Drive to a thing and face it."""
-    name = resolve_thing(robot.household, target)
+    """Drive to a thing and face it; with something in the hand to where that can be put."""
+    home = robot.household
+    if home.held is not None and home.is_any_support(target):
+        name = resolve_receptacle(home, target, home.held)
+    else:
+        name = resolve_thing(home, target)
     if name == robot.household.held:
         return f"{name} is in the gripper"
     robot.drive(name)
