@@ -89,8 +89,10 @@ def fast_downward(text: Pddl, folder: Path) -> list[str] | None:
     reason="needs the extra forestall[planning]",
 )
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.xdist_group("fast-downward")  # two runs at once write to the same files
 @pytest.mark.parametrize("name", sorted(POSED))
-def test_fast_downward_agrees(name: str, tmp_path: Path) -> None:
+def test_fast_downward_agrees(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     found = posed(name)
     if found is None:
         pytest.skip("no ground goal: nothing to export")
