@@ -1,4 +1,4 @@
-"""Configuration → objects: the one place that imports implementations across families.
+"""Configuration → objects: where implementations of different families meet.
 
 Calls: command line → here → runtime, environment, perception, memory, comparison, planning. The
 oracle view of an environment is handed to exactly two places here: the oracle state estimator, when
