@@ -41,8 +41,11 @@ def test_every_command_exists(document: Path) -> None:
 
 def test_the_example_files_are_valid(tmp_path: Path) -> None:
     text = (ROOT / "docs" / "task-format.md").read_text(encoding="utf-8")
-    task, scenario = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    task, attributes, scenario = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "task.toml").write_text(task)
     (tmp_path / "scenario.toml").write_text(scenario)
     config = RunConfig(str(tmp_path / "task.toml"), str(tmp_path / "scenario.toml"))
     assert prepare(config).loaded.task.name == "fetch-ladle"
+    (tmp_path / "with-attribute.toml").write_text(task + attributes)
+    words = prepare(RunConfig(str(tmp_path / "with-attribute.toml"))).loaded.vocabulary
+    assert words.phrases("Tomato", "ripe", "unripe") == ("an unripe tomato", "a green tomato")

@@ -11,6 +11,7 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -24,6 +25,7 @@ from forestall.benchmark.faults import (
 )
 from forestall.benchmark.files import LoadedTask, Scenario, load_scenario, load_task
 from forestall.benchmark.goals import TruthGoalChecker
+from forestall.comparison.options import Feature
 from forestall.comparison.preconditions import MiningConfig, mine, violations
 from forestall.comparison.score import BatchScorer, ScoreConfig
 from forestall.config import DEMONSTRATION_SEEDS
@@ -32,7 +34,7 @@ from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.envs.kitchen.rendering import RENDERERS
 from forestall.errors import InputError, UnknownNameError
-from forestall.interfaces import Listener, Strategy
+from forestall.interfaces import ImageTextEncoder, Listener, StateEstimator, Strategy
 from forestall.memory.retrieval import EmbeddingRetriever, RetrievalConfig
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.perceiver import GraphPerceiver
@@ -52,13 +54,20 @@ OPTIONS = (
     RetrievalConfig(),
     RuntimeConfig(),
     ScopeConfig(),
-    ScoreConfig(),
     SearchConfig(),
 )
-"""Every part's options as runs use them; they go into the record."""
+"""The options of the parts as every run uses them; with the score's they go into the record."""
 
 RUN_STATES = tuple(n for n in known("states") if n != "given")
 """Where a run's object states may come from; given ones belong to stored observations."""
+
+STATES = "learned"
+"""Where they come from when nothing is said."""
+
+FEATURES = tuple(f.value for f in Feature)
+
+STATE_ENCODERS = {"learned": "two-tower", "clip": "clip"}
+"""The image-text encoder behind each estimator that reads pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +83,7 @@ class RunConfig:
         segmenter: where masks come from.
         states: where object states come from.
         encoder: text encoder of retrieval and node features.
+        feature: what a node's feature encodes: text, parts or image (see `comparison.options`).
         threshold: alarm below this score (paper: 0.9).
         keep_observations: whether pictures stay in the record.
     """
@@ -84,8 +94,9 @@ class RunConfig:
     seed: int = 0
     renderer: str = "auto"
     segmenter: str = "instance-ids"
-    states: str = "oracle"
+    states: str = STATES
     encoder: str = "hashed-words"
+    feature: str = "parts"
     threshold: float = 0.9
     keep_observations: bool = True
 
@@ -120,6 +131,9 @@ def prepare(config: RunConfig) -> Prepared:
     if config.states not in RUN_STATES:
         raise UnknownNameError("states of a run", config.states, RUN_STATES)
     load("segmenter", config.segmenter)
+    load("encoder", config.encoder)
+    if config.feature not in FEATURES:
+        raise UnknownNameError("node feature", config.feature, FEATURES)
     if config.renderer not in RENDERERS:
         raise UnknownNameError("renderer", config.renderer, RENDERERS)
     scenario = None if config.scenario is None else load_scenario(config.scenario)
@@ -163,8 +177,9 @@ def run_episode(
     try:
         perceiver = GraphPerceiver(
             load("segmenter", config.segmenter)(),
-            _state_estimator(config.states, kitchen),
+            _state_estimator(config.states, kitchen, loaded.vocabulary),
             loaded.vocabulary,
+            image_encoder=_image_encoder(config),
         )
         runtime = Runtime(
             wrap(kitchen, prepared.faults, kitchen, loaded.vocabulary),
@@ -204,6 +219,7 @@ def make_strategy(
         )
     encoder = load("encoder", config.encoder)()
     validator = GraphValidator(vocabulary)
+    _check_features(config, demonstrations)
     return kind(  # type: ignore[no-any-return]
         EmbeddingRetriever(demonstrations, encoder),
         make_detector(config, vocabulary),
@@ -217,16 +233,21 @@ def make_detector(config: RunConfig, vocabulary: Vocabulary) -> SceneGraphDetect
     """The paper's detector with our default options."""
     encoder = load("encoder", config.encoder)()
     return SceneGraphDetector(
-        BatchScorer(ScoreConfig(), encoder), DetectorConfig(threshold=config.threshold)
+        BatchScorer(score_options(config), encoder), DetectorConfig(threshold=config.threshold)
     )
+
+
+def score_options(config: RunConfig) -> ScoreConfig:
+    """How a run scores graphs."""
+    return ScoreConfig(feature=Feature(config.feature))
 
 
 def provenance(config: RunConfig) -> tuple[tuple[str, Any], ...]:
     """What is needed to run the same again."""
-    packages = ("numpy", "scipy", "mujoco-core", "embreex")
+    packages = ("numpy", "scipy", "mujoco-core", "embreex", "onnxruntime")
     return (
         ("config", asdict(config)),
-        ("options", {type(o).__name__: asdict(o) for o in OPTIONS}),
+        ("options", {type(o).__name__: asdict(o) for o in (*OPTIONS, score_options(config))}),
         (
             "versions",
             {
@@ -246,11 +267,50 @@ def _version(package: str) -> str | None:
         return None
 
 
-def _state_estimator(name: str, kitchen: KitchenEnvironment) -> Any:
-    kind = load("states", name)
+def _state_estimator(name: str, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> Any:
     if name == "oracle":
-        return kind(kitchen.oracle.states)
-    return kind()
+        unseen = [a.name for a in vocabulary.attributes.values() if not a.camera]
+        return load("states", name)(kitchen.oracle.states, not_visible=unseen)
+    return make_state_estimator(name, vocabulary)
+
+
+def make_state_estimator(name: str, vocabulary: Vocabulary) -> StateEstimator:
+    """An estimator that sees pixels only: a shipped one with its encoder, or somebody else's."""
+    kind = load("states", name)
+    if name in STATE_ENCODERS:
+        return kind(make_image_encoder(STATE_ENCODERS[name]), vocabulary)  # type: ignore[no-any-return]
+    return kind()  # type: ignore[no-any-return]
+
+
+def _image_encoder(config: RunConfig) -> ImageTextEncoder | None:
+    """The encoder of node features, where they come from pictures."""
+    if config.feature != Feature.IMAGE.value:
+        return None
+    return make_image_encoder(STATE_ENCODERS.get(config.states, "two-tower"))
+
+
+def _check_features(config: RunConfig, demonstrations: Sequence[Demonstration]) -> None:
+    """See that a memory's node features come from the encoder in use.
+
+    Raises:
+        InputError: they come from another one, or there are none.
+    """
+    encoder = _image_encoder(config)
+    if encoder is None:
+        return
+    for d in demonstrations:
+        made = dict(d.perception).get("features")
+        if made != encoder.name:
+            raise InputError(
+                f"the node features of demonstration {d.id} come from {made or 'nothing'}, this "
+                f"run's from {encoder.name}: record the memory with the same --states and --feature"
+            )
+
+
+@cache
+def make_image_encoder(name: str) -> ImageTextEncoder:
+    """An image-text encoder, one for each process: reading a model takes its time."""
+    return load("image-encoder", name)()  # type: ignore[no-any-return]
 
 
 def _scorer(kitchen: KitchenEnvironment) -> Callable[[EpisodeRecord], EpisodeRecord]:

@@ -12,6 +12,14 @@ VERTICAL_FOV_DEG = 60.0
 DEMONSTRATION_SEEDS = 1_000_000
 """First seed of demonstration scenes; runs and surveys take seeds below."""
 
+PICTURE_SEEDS = {
+    "train": 2_000_000,
+    "development": 3_000_000,
+    "test": 4_000_000,
+    "unseen": 5_000_000,
+}
+"""First seed of the encoder's pictures of each split; each has a million of its own."""
+
 
 def cache_dir() -> Path:
     """The folder for what can be made again (FORESTALL_CACHE overrides it)."""

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import forestall
 from forestall.benchmark.files import load_task
-from forestall.build import RunConfig, prepare, run_episode
+from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.errors import ForestallError
 from forestall.memory.recording import demonstration_from
@@ -37,16 +37,23 @@ class RecordingJob:
     task: str
     first_seed: int
     tries: int = 5
-    states: str = "oracle"
+    states: str = STATES
     renderer: str = "auto"
+    feature: str = "parts"
 
 
 def jobs_for(
-    tasks: Sequence[str], kitchens: int, seed: int = DEMONSTRATION_SEEDS, states: str = "oracle"
+    tasks: Sequence[str],
+    kitchens: int,
+    seed: int = DEMONSTRATION_SEEDS,
+    states: str = STATES,
+    feature: str = "parts",
 ) -> list[RecordingJob]:
     """`kitchens` jobs for each task, each with `RecordingJob.tries` seeds of its own."""
     return [
-        RecordingJob(task, seed + 10 * k, states=states) for task in tasks for k in range(kitchens)
+        RecordingJob(task, seed + 10 * k, states=states, feature=feature)
+        for task in tasks
+        for k in range(kitchens)
     ]
 
 
@@ -64,6 +71,7 @@ def record_one(job: RecordingJob) -> Demonstration:
             seed=seed,
             states=job.states,
             renderer=job.renderer,
+            feature=job.feature,
             keep_observations=False,
         )
         record = run_episode(prepare(config), None)
@@ -112,10 +120,11 @@ def record_all(
 
 def ready_made(
     task: str,
-    states: str = "oracle",
+    states: str = STATES,
     announce: Callable[[str], None] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    feature: str = "parts",
 ) -> Path:
     """The path of a task's ready-made memory, made now if it is not in the cache.
 
@@ -130,12 +139,13 @@ def ready_made(
         announce: told once, in words, when something has to be made.
         progress: told (done, total, what).
         workers: processes; all cores by default.
+        feature: of nodes; pictures of them are kept where it is "image".
     """
     name = load_task(task).task.name
-    path = cache_dir() / "memory" / f"{name}-{_key(task, states)}.db"
+    path = cache_dir() / "memory" / f"{name}-{_key(task, states, feature)}.db"
     if path.exists():
         return path
-    jobs = jobs_for([task], KITCHENS_PER_TASK, states=states)
+    jobs = jobs_for([task], KITCHENS_PER_TASK, states=states, feature=feature)
     if announce is not None:
         announce(
             f"first use of {name}: recording {len(jobs)} demonstrations (once; kept in {path})"
@@ -153,13 +163,14 @@ def ready_made(
     return path
 
 
-def _key(task: str, states: str) -> str:
+def _key(task: str, states: str, feature: str) -> str:
     digest = hashlib.blake2b(digest_size=8)
-    parts = [forestall.__version__, states, KITCHENS_PER_TASK, repr(load_task(task))]
+    parts = [forestall.__version__, states, feature, KITCHENS_PER_TASK, repr(load_task(task))]
     digest.update(json.dumps(parts).encode())
     root = Path(forestall.__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).parts[0] not in ("cli", "report"):
+    models = (root / "data" / "encoder").glob("*")
+    for path in sorted((*root.rglob("*.py"), *models)):
+        if path.relative_to(root).parts[0] not in ("cli", "report", "training"):
             digest.update(path.relative_to(root).as_posix().encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()

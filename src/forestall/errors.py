@@ -5,6 +5,7 @@ ForestallError
 │   ├── UnknownNameError   a name that is not known, with the nearest known ones
 │   └── FileFormatError    a file that cannot be read as what it should be
 ├── MemoryFileError        the demonstration file is empty, of another version, damaged or locked
+├── ModelFileError         a model is missing or damaged, or cannot be run here
 ├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
 └── PerceptionError        an observation that cannot be used (NaN depth, wrong shapes)
 """
@@ -53,6 +54,10 @@ class FileFormatError(InputError):
 
 class MemoryFileError(ForestallError):
     """The demonstration file is empty, of another schema version, damaged or locked."""
+
+
+class ModelFileError(ForestallError):
+    """A model is missing or damaged, or cannot be run on this machine."""
 
 
 class SceneError(ForestallError):

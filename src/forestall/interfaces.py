@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.types.demonstration import Demonstration
+from forestall.types.encoder import StateReading
 from forestall.types.episode import EpisodeRecord, Event, SkillOutcome
 from forestall.types.graph import SceneGraph
-from forestall.types.observation import Detection, Frame, Observation, Vec3
+from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.task import Goal, Task
@@ -156,7 +157,7 @@ class Perceiver(Protocol):
         """The part of a graph that concerns a (grounded) subtask, with its subtask node."""
 
     def describe(self) -> Mapping[str, str]:
-        """Which segmenter and state estimator are used (goes into every record)."""
+        """Which segmenter, state estimator and image encoder are used (goes into every record)."""
 
 
 class TextEncoder(Protocol):
@@ -166,6 +167,24 @@ class TextEncoder(Protocol):
 
     def encode(self, texts: Sequence[str]) -> npt.NDArray[np.float32]:
         """(n, d) float32 rows of unit length."""
+
+
+class ImageEncoder(Protocol):
+    """Embeds pictures; what one encoder gives compares only with what the same one gives."""
+
+    name: str
+
+    def encode_crops(self, rgb: Rgb, masks: Sequence[Mask]) -> npt.NDArray[np.float32]:
+        """(n, d) float32 rows of unit length, one for the object under each mask."""
+
+    def encode_image(self, rgb: Rgb) -> npt.NDArray[np.float32]:
+        """(d,) float32 of unit length: the whole picture."""
+
+
+class ImageTextEncoder(ImageEncoder, TextEncoder, Protocol):
+    """Pictures and texts in one space, as CLIP has them."""
+
+    reading: StateReading
 
 
 class DemonstrationStore(Protocol):

@@ -24,11 +24,19 @@ TABLES: dict[str, dict[str, str]] = {
         "given-masks": "forestall.perception.segmenters:GivenMasks",
     },
     "states": {
+        "clip": "forestall.perception.learned:LearnedStateEstimator",
+        "learned": "forestall.perception.learned:LearnedStateEstimator",
         "oracle": "forestall.perception.oracle:OracleStateEstimator",
         "given": "forestall.perception.given:GivenStateEstimator",
     },
+    "image-encoder": {
+        "clip": "forestall.embeddings.clip:ClipEncoder",
+        "two-tower": "forestall.embeddings.twotower:TwoTowerEncoder",
+    },
     "encoder": {
         "hashed-words": "forestall.embeddings.hashed:HashedTextEncoder",
+        "sentence": "forestall.embeddings.sentence:SentenceEncoder",
+        "two-tower": "forestall.embeddings.twotower:TwoTowerEncoder",
     },
 }
 

@@ -15,12 +15,11 @@ from dataclasses import replace
 from typing import Any
 
 from forestall.benchmark.files import load_task
-from forestall.build import RunConfig, prepare, run_episode
+from forestall.build import STATES, RunConfig, make_state_estimator, prepare, run_episode
 from forestall.comparison.timing import score_times
 from forestall.demonstrations import ready_made
 from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.memory.store import open_store
-from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.planning.validate import GraphValidator
@@ -73,7 +72,7 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
         rows.append(_row("RGB-D-and-ids frame", "ms", times, 300))
         perceiver = GraphPerceiver(
             InstanceSegmenter(),
-            OracleStateEstimator(kitchen.oracle.states),
+            make_state_estimator(STATES, loaded.vocabulary),
             loaded.vocabulary,
         )
         around = kitchen.scan()

@@ -9,16 +9,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from forestall.benchmark.files import load_task
-from forestall.build import RunConfig, make_detector
+from forestall.build import RunConfig, make_detector, make_state_estimator
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.embeddings.hashed import HashedTextEncoder
+from forestall.errors import UnknownNameError
 from forestall.grounding import ground_subtask
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.perception.folder import read_observation
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks
+from forestall.registry import known
 from forestall.types.demonstration import Demonstration
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
@@ -35,6 +37,7 @@ def judge_stored(
     task: str | None,
     demonstrations: Sequence[Demonstration],
     threshold: float,
+    states: str = "given",
 ) -> tuple[SceneGraph, Verdict, Diagnosis | None]:
     """The scoped graph, the verdict, and on an alarm the diagnosis.
 
@@ -44,6 +47,7 @@ def judge_stored(
         task: name or file of the task; its own demonstrations are preferred.
         demonstrations: the memory.
         threshold: of the detector.
+        states: "given", those in the folder; or what reads them off its pictures.
 
     Raises:
         InputError: a name, the observation or the subtask is not valid.
@@ -53,8 +57,16 @@ def judge_stored(
     wanted = Subtask.parse(subtask)
     for name in wanted.args:
         vocabulary[name]
-    observation, states = read_observation(folder, vocabulary)
-    perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator(states), vocabulary)
+    if states not in known("states") or states == "oracle":
+        options = [n for n in known("states") if n != "oracle"]
+        raise UnknownNameError("states of a stored observation", states, options)
+    observation, given = read_observation(folder, vocabulary)
+    estimator = (
+        GivenStateEstimator(given)
+        if states == "given"
+        else make_state_estimator(states, vocabulary)
+    )
+    perceiver = GraphPerceiver(GivenMasks(), estimator, vocabulary)
     graph = perceiver.perceive(observation)
     ground = ground_subtask(wanted, graph, vocabulary, observation.robot_position_world_m, {})
     scoped = perceiver.scope(graph, ground)

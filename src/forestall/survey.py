@@ -17,7 +17,7 @@ from typing import Any
 
 import forestall
 from forestall.benchmark.files import load_scenario
-from forestall.build import RunConfig, prepare, run_episode
+from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.demonstrations import ready_made
 from forestall.errors import FileFormatError, InputError
@@ -38,7 +38,9 @@ class Job:
     strategy: str
     seed: int
     memory: str | None = None
-    states: str = "oracle"
+    states: str = STATES
+    feature: str = "parts"
+    encoder: str = "hashed-words"
 
     @property
     def key(self) -> str:
@@ -70,20 +72,32 @@ def jobs_for(
     strategies: Iterable[str],
     seeds: Iterable[int],
     memory: str | None = None,
-    states: str = "oracle",
+    states: str = STATES,
+    feature: str = "parts",
+    encoder: str = "hashed-words",
 ) -> list[Job]:
     """Undisturbed runs of the tasks, and runs of the scenarios, with each strategy and seed."""
     pairs: list[tuple[str, str | None]] = [(t, None) for t in tasks]
     pairs += [(load_scenario(s).task, s) for s in scenarios]
     seeds = list(seeds)
     jobs = [
-        Job(t, s, strategy, seed, memory, states)
+        Job(t, s, strategy, seed, memory, states, feature, encoder)
         for strategy in strategies
         for t, s in pairs
         for seed in seeds
     ]
     for job in {(j.task, j.scenario, j.strategy): j for j in jobs}.values():
-        prepare(RunConfig(job.task, job.scenario, job.strategy, job.seed))
+        prepare(
+            RunConfig(
+                job.task,
+                job.scenario,
+                job.strategy,
+                job.seed,
+                states=job.states,
+                feature=job.feature,
+                encoder=job.encoder,
+            )
+        )
     return jobs
 
 
@@ -94,7 +108,8 @@ def survey(
     rows = _read(out)
     todo = [j for j in jobs if j.key not in rows]
     for task in sorted({j.task for j in todo if j.memory is None and j.strategy != "none"}):
-        ready_made(task, todo[0].states, progress=progress, workers=workers)
+        first = todo[0]
+        ready_made(task, first.states, progress=progress, workers=workers, feature=first.feature)
     out.parent.mkdir(parents=True, exist_ok=True)
     progress(len(jobs) - len(todo), len(jobs), "episodes")
     with (
@@ -123,6 +138,8 @@ def run_job(job: Job) -> dict[str, Any]:
         job.strategy,
         job.seed,
         states=job.states,
+        feature=job.feature,
+        encoder=job.encoder,
         keep_observations=False,
     )
     demonstrations = None if job.strategy == "none" else _demonstrations(job)
@@ -181,7 +198,7 @@ def _opened(path: str) -> tuple[Demonstration, ...]:
 
 
 def _demonstrations(job: Job) -> tuple[Demonstration, ...]:
-    return _opened(job.memory or str(ready_made(job.task, job.states)))
+    return _opened(job.memory or str(ready_made(job.task, job.states, feature=job.feature)))
 
 
 def _read(out: Path) -> dict[str, dict[str, Any]]:

@@ -2,11 +2,13 @@
 
 Read from `data/vocabulary.toml` and extended by task files. Everything that must know "a mug can
 be filled" or "a plate goes into a microwave" asks here: the household, perception (which states to
-look for), planning (the skill domain) and the checking of task files.
+look for, and the phrases that say how they look), planning (the skill domain) and the checking of
+task files.
 """
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -14,8 +16,29 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from forestall.attributes import (
+    THING,
+    Attribute,
+    check_text,
+    parse_attribute,
+    texts,
+    with_articles,
+)
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import category_of
+
+__all__ = [
+    "ATTRIBUTES",
+    "SHAPES",
+    "Attribute",
+    "Category",
+    "Device",
+    "Receptacle",
+    "Vocabulary",
+    "household",
+    "parse_attribute",
+    "parse_category",
+]
 
 ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "open": ("closed", "open"),
@@ -27,7 +50,10 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "cooked": ("raw", "cooked"),
     "temperature": ("room", "hot", "cold"),
 }
-"""Attribute → its values; the first is the default of a new object."""
+"""Attribute → its values, of the shipped vocabulary; the first is the default of a new object.
+
+Whoever must know the attributes of a task file asks `Vocabulary.attributes`.
+"""
 
 
 SHAPES = (
@@ -44,6 +70,10 @@ SHAPES = (
     "vessel",
 )
 """Shapes that the household can build from a size."""
+
+
+_LISTS = ("attributes", "aliases", "fits", "synonyms")
+"""Fields of a category that hold names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +152,12 @@ class Category:
     defaults: tuple[tuple[str, str], ...] = ()
     aliases: tuple[str, ...] = ()
     words: str = ""  # how a person calls it
+    synonyms: tuple[str, ...] = ()  # other everyday names
+
+    @property
+    def spoken(self) -> str:
+        """How a person calls it; a category without words goes by its name: "SoupLadle" too."""
+        return self.words or re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", self.name).lower()
 
     @property
     def washable_food(self) -> bool:
@@ -131,9 +167,10 @@ class Category:
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
-    """Every category by name."""
+    """Every category and every attribute by name."""
 
     categories: Mapping[str, Category] = field(hash=False)
+    attributes: Mapping[str, Attribute] = field(hash=False)
 
     def __getitem__(self, name: str) -> Category:
         """The category of a category or instance name, aliases included.
@@ -173,8 +210,46 @@ class Vocabulary:
     def default_states(self, name: str) -> dict[str, str]:
         """Attribute → value of a new object."""
         category = self[name]
-        states = {a: ATTRIBUTES[a][0] for a in category.attributes}
+        states = {a: self.attributes[a].values[0] for a in category.attributes}
         return states | dict(category.defaults)
+
+    def values(self, attribute: str) -> tuple[str, ...]:
+        """Every value of an attribute, the default first.
+
+        Raises:
+            UnknownNameError: no such attribute.
+        """
+        found = self.attributes.get(attribute)
+        if found is None:
+            raise UnknownNameError("attribute", attribute, self.attributes)
+        return found.values
+
+    @property
+    def lasting(self) -> tuple[str, ...]:
+        """Attributes that slices, and what is cracked, take over from what they are made of.
+
+        Among them are those of task files: no skill changes them.
+        """
+        return ("temperature", "cooked", *(a for a in self.attributes if a not in ATTRIBUTES))
+
+    def phrases(self, category: str, attribute: str, value: str) -> tuple[str, ...]:
+        """Texts that fit a picture of a thing (name or category) whose attribute has a value.
+
+        The plainest comes first. None for an attribute that no camera can see; for a value that
+        has no phrases of its own, "a <value> <thing>".
+
+        Raises:
+            UnknownNameError: no such category, attribute or value.
+        """
+        thing = self[category]
+        if value not in self.values(attribute):
+            raise UnknownNameError(f"value of {attribute}", value, self.values(attribute))
+        kind = self.attributes[attribute]
+        if not kind.camera:
+            return ()
+        texts = kind.by_category.get(thing.name, {}).get(value) or kind.phrases.get(value)
+        texts = texts or (f"a {value.replace('_', ' ')} {THING}",)
+        return tuple(with_articles(t.replace(THING, thing.spoken)) for t in texts)
 
     def encloses(self, name: str) -> bool:
         """Whether contents cannot be seen or reached while it is closed."""
@@ -185,31 +260,49 @@ class Vocabulary:
             and "open" in category.attributes
         )
 
-    def extended(self, more: Mapping[str, Category]) -> Vocabulary:
-        """This vocabulary with further categories.
+    def extended(
+        self,
+        categories: Mapping[str, Category],
+        attributes: Mapping[str, Attribute] | None = None,
+    ) -> Vocabulary:
+        """This vocabulary with further categories and attributes.
 
         New pickupable categories are taken wherever "*" is accepted.
+
+        Raises:
+            InputError: phrases are given for a category that does not exist.
         """
-        return replace(self, categories={**self.categories, **more})
+        found = Vocabulary(
+            {**self.categories, **categories}, {**self.attributes, **(attributes or {})}
+        )
+        for attribute in found.attributes.values():
+            for category in attribute.by_category:
+                if category not in found.categories:
+                    kind = f"category in by_category of attribute {attribute.name}"
+                    raise UnknownNameError(kind, category, found.categories)
+        return found
 
 
-def parse_category(name: str, data: Mapping[str, Any]) -> Category:
+def parse_category(
+    name: str,
+    data: Mapping[str, Any],
+    attributes: Mapping[str, tuple[str, ...]] = ATTRIBUTES,
+    base: Category | None = None,
+) -> Category:
     """Build one category from its TOML table.
 
+    Args:
+        name: name of the category.
+        data: its table.
+        attributes: every attribute with its values.
+        base: what the category is so far: lists and defaults are added to, other fields replaced.
+
     Raises:
-        InputError: an unknown field, attribute or value.
+        InputError: an unknown field, attribute or value, or words that no encoder can read.
     """
     fields = dict(data)
-    unknown = set(fields) - set(Category.__dataclass_fields__) - {"name"}
-    if unknown:
-        raise InputError(f"category {name}: unknown field {', '.join(sorted(unknown))}")
-    for attribute in fields.get("attributes", ()):
-        if attribute not in ATTRIBUTES:
-            raise UnknownNameError(f"attribute of {name}", attribute, ATTRIBUTES)
+    _check_names(name, fields, attributes)
     defaults = tuple(sorted(fields.pop("defaults", {}).items()))
-    for attribute, value in defaults:
-        if value not in ATTRIBUTES.get(attribute, ()):
-            raise UnknownNameError(f"{attribute} of {name}", value, ATTRIBUTES.get(attribute, ()))
     receptacle = fields.pop("receptacle", None)
     if receptacle is not None:
         receptacle = Receptacle(
@@ -234,20 +327,48 @@ def parse_category(name: str, data: Mapping[str, Any]) -> Category:
     kind = fields.get("shape", {}).get("kind", SHAPES[0])
     if kind not in SHAPES:
         raise UnknownNameError(f"shape of {name}", kind, SHAPES)
+    lists: dict[str, Any] = {k: tuple(fields.pop(k)) for k in _LISTS if k in fields}
+    if base is None:
+        return Category(
+            name=name, defaults=defaults, receptacle=receptacle, device=device, **lists, **fields
+        )
+    fields |= {k: tuple(dict.fromkeys(getattr(base, k) + v)) for k, v in lists.items()}
+    fields["defaults"] = tuple(sorted((dict(base.defaults) | dict(defaults)).items()))
+    fields |= {k: v for k, v in (("receptacle", receptacle), ("device", device)) if v is not None}
+    return replace(base, **fields)
+
+
+def _check_names(
+    name: str, fields: Mapping[str, Any], attributes: Mapping[str, tuple[str, ...]]
+) -> None:
+    """Check the fields of a category that are names, words and flags."""
+    unknown = set(fields) - set(Category.__dataclass_fields__) | set(fields) & {"name"}
+    if unknown:
+        raise InputError(f"category {name}: unknown field {', '.join(sorted(unknown))}")
+    for key in _LISTS:
+        names = fields.get(key, ())
+        if not isinstance(names, list | tuple) or not all(isinstance(n, str) for n in names):
+            raise InputError(f"category {name}: {key} must be a list of texts")
+    for attribute in fields.get("attributes", ()):
+        if attribute not in attributes:
+            raise UnknownNameError(f"attribute of {name}", attribute, attributes)
+    for attribute, value in sorted(fields.get("defaults", {}).items()):
+        if value not in attributes.get(attribute, ()):
+            raise UnknownNameError(f"{attribute} of {name}", value, attributes.get(attribute, ()))
+    if fields.get("words"):
+        check_text(f"category {name}: words", fields["words"])
+    texts(f"category {name}: synonyms", fields.get("synonyms", ()))
     for flag in ("pickupable", "fixture", "food", "drains", "fragile"):
         if not isinstance(fields.get(flag, False), bool):
             raise InputError(f"category {name}: {flag} must be true or false")
-    lists: dict[str, Any] = {
-        k: tuple(fields.pop(k)) for k in ("attributes", "aliases", "fits") if k in fields
-    }
-    return Category(
-        name=name, defaults=defaults, receptacle=receptacle, device=device, **lists, **fields
-    )
 
 
 @cache
 def household() -> Vocabulary:
     """The vocabulary that the project ships."""
     text = files("forestall").joinpath("data/vocabulary.toml").read_text(encoding="utf-8")
-    tables = tomllib.loads(text)["categories"]
-    return Vocabulary({name: parse_category(name, table) for name, table in tables.items()})
+    tables = tomllib.loads(text)
+    return Vocabulary({}, {}).extended(
+        {name: parse_category(name, table) for name, table in tables["categories"].items()},
+        {name: parse_attribute(name, table) for name, table in tables["attributes"].items()},
+    )

@@ -134,9 +134,87 @@ def test_unknown_names_come_with_near_ones(tmp_path: Path) -> None:
         load_task(str(tmp_path / "absent.toml"))
 
 
+RIPE = """
+name = "fetch-tomato"
+title = "Fetch a ripe tomato"
+plan = ["pick_up(Tomato)", "put_on(Tomato, DiningTable)"]
+
+[goal]
+text = "A ripe tomato lies on the dining table."
+variables = { "?tomato" = "Tomato" }
+all = ["on_top_of(?tomato, DiningTable)", "ripe(?tomato)=ripe"]
+
+[[scene.objects]]
+category = "Tomato"
+states = { ripe = "ripe" }
+
+[attributes.ripe]
+values = ["unripe", "ripe"]
+phrases = { unripe = ["a green {thing}"], ripe = ["a red {thing}"] }
+
+[attributes.open.phrases]
+open = ["a {thing} ajar"]
+
+[categories.Tomato]
+attributes = ["ripe"]
+synonyms = ["love apple"]
+"""
+
+
+def test_a_task_with_an_attribute_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(RIPE, encoding="utf-8")
+    loaded = load_task(str(path))
+    words = loaded.vocabulary
+    assert words["Tomato"].attributes == ("sliced", "temperature", "ripe")
+    assert words["Tomato"].synonyms[-1] == "love apple"
+    assert words["Tomato"].slices_into == "TomatoSliced"
+    assert words.phrases("Tomato", "ripe", "ripe") == ("a red tomato",)
+    assert words.phrases("Fridge", "open", "open") == ("a fridge ajar",)
+    assert loaded.task.scene.objects[0].states == (("ripe", "ripe"),)
+    assert str(loaded.task.goal.literals[1]) == "ripe(?tomato)=ripe"
+    assert "ripe" not in load_task("make-salad").vocabulary.attributes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('values = ["unripe", "ripe"]', 'values = ["ripe"]', "attribute ripe: values must name"),
+        ("values = [", "colour = [", "unknown field colour: known: values"),
+        ("unripe = [", "rotten = [", "'rotten': known: ripe, unripe"),
+        ("a green {thing}", "зелёный {thing}", "attribute ripe: phrases.unripe.*Latin letters"),
+        ("a green {thing}", "", "phrases.unripe: '' is empty"),
+        ('["a green {thing}"]', '"green"', "attributes.ripe.phrases.unripe.*list"),
+        ("[attributes.ripe]", "[attributes.near]", "name of a relation"),
+        ("[attributes.ripe]", "[attributes.pour]", "name of a skill"),
+        ("[attributes.ripe]", "[attributes.located]", "name of a derived fact"),
+        ("open = [", "ajar = [", "'ajar': known: closed, open"),
+        (
+            '[attributes.open.phrases]\nopen = ["a {thing} ajar"]',
+            '[attributes.open]\nvalues = ["closed", "ajar"]',
+            r"attribute open exists: its values \(closed, open\)",
+        ),
+        ('attributes = ["ripe"]', 'attributes = ["rype"]', "'rype': did you mean ripe"),
+        ('{ ripe = "ripe" }', '{ ripe = "rotten" }', "ripe of Tomato 'rotten'"),
+        ("ripe(?tomato)=ripe", "ripe(?tomato)=red", "value of ripe 'red'"),
+        ('synonyms = ["love apple"]', 'synonyms = [""]', "synonyms: '' is empty"),
+    ],
+)
+def test_wrong_attributes_of_task_files(tmp_path: Path, old: str, new: str, says: str) -> None:
+    assert old in RIPE
+    path = tmp_path / "own.toml"
+    path.write_text(RIPE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=says) as caught:
+        load_task(str(path))
+    assert str(path) in str(caught.value)
+
+
 def test_the_schemas_name_every_field() -> None:
     both = schemas()
     assert {"name", "plan", "goal", "scene", "categories"} <= set(both["task"]["properties"])
+    fields = both["task"]["$defs"]["AttributeFile"]
+    assert set(fields["properties"]) == {"values", "phrases", "camera", "by_category"}
+    assert fields["additionalProperties"] is False
     assert "faults" in both["scenario"]["properties"]
 
 

@@ -94,7 +94,9 @@ PAIRS = [
         1,
         ScoreConfig(state_changes_match=True, state_weight=0),
     ),
-    Pair("dirt not counted", DIRTY, EXPECTED, 1, 1, 1, 1, ScoreConfig(attributes=("open",))),
+    Pair(
+        "dirt not counted", DIRTY, EXPECTED, 1, 1, 1, 1, ScoreConfig(ignored_attributes=("dirty",))
+    ),
     # the microwave is an end of no edge: 4 of 6 nodes
     Pair("closed microwave", CLOSED, EXPECTED, 4 / 6, 1, 1, 8 / 9),
     # 4 of 5 nodes; no edge in common; the gripper has one edge less, D = 1, N = 4

@@ -47,9 +47,10 @@ def test_worked_pairs_in_a_batch(pair: Pair) -> None:
 
 def graphs(largest: int = 14) -> st.SearchStrategy[SceneGraph]:
     return st.builds(
-        lambda n, seed: random_graph(n, np.random.default_rng(seed)),
+        lambda n, seed, size: random_graph(n, np.random.default_rng(seed), feature_size=size),
         st.integers(2, largest),
         st.integers(0, 2**20),
+        st.sampled_from((0, 6, 6)),
     )
 
 
@@ -57,6 +58,7 @@ configs = st.builds(
     ScoreConfig,
     feature=st.sampled_from(Feature),
     floor=st.sampled_from((0.3, 0.6, 0.9)),
+    image_floor=st.sampled_from((0.2, 0.6)),
     state_changes_match=st.booleans(),
     subtask_node=st.booleans(),
     degree_scale=st.sampled_from(DegreeScale),

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sqlite3
 import subprocess
 import sys
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +17,10 @@ from demonstration_samples import demonstration, with_id
 from forestall.errors import InputError, MemoryFileError
 from forestall.memory.codec import DamageError, decode, encode
 from forestall.memory.store import SCHEMA_VERSION, SqliteStore, open_store
+from forestall.types.demonstration import Demonstration
+from forestall.types.facts import GRIPPER
+from forestall.types.feature import quantised
+from forestall.types.graph import SceneGraph
 
 PLAN = ("navigate_to_obj(Mug-1)", "pick_up(Mug-1)", "put_in(Mug-1, Sink-1)")
 ONE = demonstration("make-coffee", 3, PLAN)
@@ -43,6 +49,52 @@ def test_what_is_stored_comes_back(path: Path) -> None:
     assert [replace(d, id="") for d in found] == [ONE, TWO]
     assert found[0].steps[2].graph.text() == ONE.steps[2].graph.text()
     assert hash(found[0].steps[0].whole) == hash(ONE.steps[0].whole)
+
+
+def with_features(sample: Demonstration) -> Demonstration:
+    """Every object of every graph with an image feature of its own."""
+
+    def seen(graph: SceneGraph) -> SceneGraph:
+        nodes = (
+            n if n.id == GRIPPER else replace(n, feature=quantised([len(n.id), i + 1, -2]))
+            for i, n in enumerate(graph.nodes)
+        )
+        return replace(graph, nodes=tuple(nodes))
+
+    steps = (replace(s, graph=seen(s.graph), whole=seen(s.whole)) for s in sample.steps)
+    return replace(sample, steps=tuple(steps))
+
+
+def test_image_features_come_back(path: Path) -> None:
+    pictured = with_features(ONE)
+    with open_store(path, create=True) as store:
+        names = [store.add(ONE), store.add(pictured)]
+        assert names[0] != names[1]
+    with open_store(path) as store:
+        found = {d.id: replace(d, id="") for d in store.all()}
+    assert [found[n] for n in names] == [ONE, pictured]
+    node = found[names[1]].steps[0].graph.get("Mug-1")
+    assert node is not None and node.feature is not None
+
+
+def test_without_features_nothing_is_written_of_them() -> None:
+    """So that what was stored before there were any is read and hashed as before."""
+    things = json.loads(zlib.decompress(encode(ONE).things))
+    assert things["format"] == 1
+    keys = {key for node in things["nodes"] for key in node}
+    assert keys == {
+        *("box_m", "category", "centroid_m", "id", "last_seen_s", "pixels", "seen", "states")
+    }
+
+
+@pytest.mark.parametrize("feature", ["no base64!", "", "AAAA", 5])
+def test_a_damaged_feature(feature: object) -> None:
+    encoded = encode(ONE)
+    things = json.loads(zlib.decompress(encoded.things))
+    things["nodes"][0]["feature"] = feature
+    bad = replace(encoded, things=zlib.compress(json.dumps(things).encode()))
+    with pytest.raises(DamageError, match="demonstration x is damaged"):
+        decode(bad, "x", bad.digest)
 
 
 def test_one_file_is_left_when_it_is_closed(path: Path) -> None:

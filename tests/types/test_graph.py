@@ -1,6 +1,7 @@
 """Scene graphs: invariants, three-valued truth, round trips."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -72,6 +73,31 @@ def test_json_round_trip_is_the_identity() -> None:
     assert SceneGraph.from_json(json.loads(json.dumps(graph.to_json()))) == graph
     assert "inside of Microwave-1: unobserved" in graph.text()
     assert graph.to_networkx().number_of_edges() == 2
+
+
+def test_image_features_survive_json_where_there_are_any() -> None:
+    plain = kitchen()
+    assert all("feature" not in n for n in plain.to_json()["nodes"])
+    plate = replace(plain.nodes[2], feature=bytes([127, 0, 200]))
+    graph = replace(plain, nodes=(*plain.nodes[:2], plate, *plain.nodes[3:]))
+    assert graph != plain
+    assert SceneGraph.from_json(json.loads(json.dumps(graph.to_json()))) == graph
+    assert graph.to_json(features=False) == plain.to_json()
+    assert graph.text() == plain.text()
+
+
+@pytest.mark.parametrize("feature", ["no base64!", "AA=", 7, ["AAEC"]])
+def test_a_feature_that_cannot_be_read(feature: object) -> None:
+    data = kitchen().to_json()
+    data["nodes"][0]["feature"] = feature
+    with pytest.raises(FileFormatError, match="broken scene graph"):
+        SceneGraph.from_json(data)
+
+
+@pytest.mark.parametrize("feature", [b"", bytes(4)])
+def test_a_feature_has_a_direction(feature: bytes) -> None:
+    with pytest.raises(InputError, match="the image feature of A-1 is empty or all zero"):
+        ObjectNode("A-1", "A", feature=feature)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ from forestall.interfaces import Disturbance, Environment
 from forestall.types.facts import category_of, is_instance
 from forestall.types.plan import SKILLS, Plan, Subtask, same_step
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import ATTRIBUTES, Vocabulary, household
+from forestall.vocabulary import Vocabulary, household
 
 
 def _readable(text: str) -> str:
@@ -347,8 +347,9 @@ def _check_state(
     known = vocabulary[category].attributes
     if attribute not in known:
         raise UnknownNameError(f"attribute of {category} ({field})", attribute, known)
-    if value not in ATTRIBUTES[attribute]:
-        raise UnknownNameError(f"value of {attribute} ({field})", value, ATTRIBUTES[attribute])
+    values = vocabulary.values(attribute)
+    if value not in values:
+        raise UnknownNameError(f"value of {attribute} ({field})", value, values)
 
 
 def _places(places: Sequence[str], field: str, vocabulary: Vocabulary) -> tuple[str, ...]:

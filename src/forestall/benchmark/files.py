@@ -16,6 +16,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from forestall.attributes import parse_attribute
 from forestall.benchmark.faults import Fault
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.types.facts import DERIVED, RELATIONS, category_of, is_instance
@@ -23,7 +24,7 @@ from forestall.types.facts import Literal as Fact
 from forestall.types.plan import Plan
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
-from forestall.vocabulary import ATTRIBUTES, Vocabulary, household, parse_category
+from forestall.vocabulary import Vocabulary, household, parse_category
 
 M = TypeVar("M", bound=BaseModel)
 _NAME = r"^[a-z0-9]+(-[a-z0-9]+)*$"
@@ -62,6 +63,19 @@ class SceneFile(_Model):
     fixtures: dict[str, dict[str, str]] = Field(default_factory=dict)
 
 
+class AttributeFile(_Model):
+    """A new attribute, or other phrases for a known one; `parse_attribute` checks what it says."""
+
+    model_config = ConfigDict(
+        extra="allow", frozen=True, json_schema_extra={"additionalProperties": False}
+    )
+
+    values: list[str] | None = None
+    phrases: dict[str, list[str]] | None = None
+    camera: bool | None = None
+    by_category: dict[str, dict[str, list[str]]] | None = None
+
+
 class TaskFile(_Model):
     """A task file."""
 
@@ -70,6 +84,7 @@ class TaskFile(_Model):
     plan: list[str] = Field(min_length=1)
     goal: GoalFile
     scene: SceneFile = SceneFile()
+    attributes: dict[str, AttributeFile] = Field(default_factory=dict)
     categories: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 
@@ -178,12 +193,8 @@ def _validated(model: type[M], source: str, text: str) -> M:
 
 
 def _task(source: str, data: TaskFile) -> LoadedTask:
-    vocabulary = household()
-    if data.categories:
-        vocabulary = vocabulary.extended(
-            {name: parse_category(name, table) for name, table in data.categories.items()}
-        )
     try:
+        vocabulary = _vocabulary(data)
         goal = _goal(data.goal, vocabulary)
         plan = Plan.parse(data.plan, data.goal.text)
         for subtask in plan:
@@ -193,6 +204,21 @@ def _task(source: str, data: TaskFile) -> LoadedTask:
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     return LoadedTask(task, vocabulary)
+
+
+def _vocabulary(data: TaskFile) -> Vocabulary:
+    """The shipped vocabulary with what the file adds to it."""
+    known = household()
+    attributes = {
+        name: parse_attribute(name, table.model_dump(exclude_none=True), known.attributes.get(name))
+        for name, table in data.attributes.items()
+    }
+    values = {a.name: a.values for a in {**known.attributes, **attributes}.values()}
+    categories = {
+        name: parse_category(name, table, values, known.categories.get(name))
+        for name, table in data.categories.items()
+    }
+    return known.extended(categories, attributes)
 
 
 def _goal(data: GoalFile, vocabulary: Vocabulary) -> Goal:
@@ -215,13 +241,13 @@ def _goal(data: GoalFile, vocabulary: Vocabulary) -> Goal:
 
 def _fact(text: str, variables: Mapping[str, str], vocabulary: Vocabulary) -> Fact:
     fact = Fact.parse(text)
-    if fact.predicate in ATTRIBUTES:
-        if fact.value not in ATTRIBUTES[fact.predicate]:
-            raise UnknownNameError(
-                f"value of {fact.predicate}", fact.value, ATTRIBUTES[fact.predicate]
-            )
+    if fact.predicate in vocabulary.attributes:
+        values = vocabulary.values(fact.predicate)
+        if fact.value not in values:
+            raise UnknownNameError(f"value of {fact.predicate}", fact.value, values)
     elif fact.predicate not in (*RELATIONS, *DERIVED):
-        raise UnknownNameError("fact", fact.predicate, (*ATTRIBUTES, *RELATIONS, *DERIVED))
+        known = (*vocabulary.attributes, *RELATIONS, *DERIVED)
+        raise UnknownNameError("fact", fact.predicate, known)
     for name in fact.args:
         if name.startswith("?"):
             if name not in variables:
@@ -264,5 +290,5 @@ def _check_states(name: str, states: Mapping[str, str], vocabulary: Vocabulary) 
     for attribute, value in states.items():
         if attribute not in category.attributes:
             raise UnknownNameError(f"attribute of {category.name}", attribute, category.attributes)
-        if value not in ATTRIBUTES[attribute]:
-            raise UnknownNameError(f"{attribute} of {name}", value, ATTRIBUTES[attribute])
+        if value not in vocabulary.values(attribute):
+            raise UnknownNameError(f"{attribute} of {name}", value, vocabulary.values(attribute))

@@ -71,7 +71,9 @@ def episodes(
     strategy: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     seeds: str = "100:105",
     memory: Path | None = None,
-    states: str = "oracle",
+    states: str = "learned",
+    feature: str = "parts",
+    encoder: str = "hashed-words",
     jobs: int | None = None,
     out: Path = Path("runs/episodes.jsonl"),
     as_json: Json = False,
@@ -85,7 +87,9 @@ def episodes(
         strategy: strategies; none and proactive by default.
         seeds: scenes, e.g. 100:120 for 100 to 119.
         memory: a demonstration file; the ready-made one of each task by default.
-        states: where object states come from.
+        states: where object states come from: learned, clip or oracle.
+        feature: what a node's feature encodes: text, parts or image.
+        encoder: of texts: hashed-words, two-tower, sentence.
         jobs: how many processes; all cores by default.
         out: results, one JSON line each; what is in it already is not run again.
         as_json: print JSON instead of the table.
@@ -107,6 +111,8 @@ def episodes(
         parse_seeds(seeds),
         None if memory is None else str(memory),
         states,
+        feature,
+        encoder,
     )
     with bar("running", quiet=quiet or as_json) as feed:
         rows = survey(todo, jobs or os.cpu_count() or 1, out, feed)

@@ -27,7 +27,8 @@ def record(
     task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     kitchens: int = 4,
     seed: int = 1_000_000,
-    states: str = "oracle",
+    states: str = "learned",
+    feature: str = "parts",
     jobs: int | None = None,
     quiet: Quiet = False,
 ) -> int:
@@ -38,7 +39,8 @@ def record(
         task: task names or files; all shipped tasks by default.
         kitchens: demonstrations per task.
         seed: first seed of the demonstration scenes.
-        states: where object states come from.
+        states: where object states come from: learned, clip or oracle.
+        feature: "image" keeps the look of every object, for runs with --feature image.
         jobs: how many processes; all cores by default.
         quiet: no progress bar.
     """
@@ -55,7 +57,7 @@ def record(
     names = task or list(task_names())
     for name in names:
         load_task(name)
-    todo = jobs_for(names, kitchens, seed, states)
+    todo = jobs_for(names, kitchens, seed, states, feature)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:
         count = 0
         for demonstration in record_all(todo, jobs or os.cpu_count() or 1, feed):
@@ -99,7 +101,7 @@ def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
 
 
 def load_memory(
-    memory: Path | None, task: str, states: str, quiet: bool
+    memory: Path | None, task: str, states: str, quiet: bool, feature: str = "parts"
 ) -> tuple[list[Demonstration], str]:
     """Every demonstration of a memory, and its path.
 
@@ -108,18 +110,19 @@ def load_memory(
         task: name or file.
         states: where object states come from.
         quiet: no progress on standard error.
+        feature: what a node's feature encodes.
 
     Raises:
         MemoryFileError: see `memory.store`.
     """
     from forestall.memory.store import open_store
 
-    path = memory or _ready_made(task, states, quiet)
+    path = memory or _ready_made(task, states, quiet, feature)
     with open_store(path) as store:
         return list(store.required()), str(path)
 
 
-def _ready_made(task: str, states: str, quiet: bool) -> Path:
+def _ready_made(task: str, states: str, quiet: bool, feature: str) -> Path:
     from forestall.cli.progress import bar
     from forestall.demonstrations import ready_made
 
@@ -127,4 +130,4 @@ def _ready_made(task: str, states: str, quiet: bool) -> Path:
         print(f"forestall: {text}", file=sys.stderr)
 
     with bar("recording", quiet=quiet) as feed:
-        return ready_made(task, states, announce, feed)
+        return ready_made(task, states, announce, feed, feature=feature)

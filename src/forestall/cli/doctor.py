@@ -12,6 +12,9 @@ Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 _EXTRAS = {
     "planning": (("unified_planning", "up_fast_downward"), "cross-check with Fast Downward"),
+    "text": (("sentence_transformers",), "a sentence encoder, --encoder sentence"),
+    "training": (("torch", "onnx"), "training an image-text encoder"),
+    "vision": (("torch", "transformers"), "CLIP, --states clip"),
 }
 
 
@@ -67,6 +70,7 @@ def _needed() -> list[dict[str, Any]]:
             rows.append(_row("memory", True, True, f"SQLite {sqlite3.sqlite_version}"))
         except ForestallError as error:
             rows.append(_row("memory", False, True, str(error), "free space or use another folder"))
+    rows.append(_encoder())
     folder_ok, detail = _writable(cache_dir())
     rows.append(
         _row("cache folder", folder_ok, True, detail, "set FORESTALL_CACHE to a writable folder")
@@ -76,6 +80,23 @@ def _needed() -> list[dict[str, Any]]:
             p = probes[name]
             rows.append(_row(f"renderer {name}", p.works, False, p.detail, p.hint))
     return rows
+
+
+def _encoder() -> dict[str, Any]:
+    """Whether the shipped encoder can be read and run."""
+    import time
+
+    from forestall.embeddings.twotower import TwoTowerEncoder
+    from forestall.errors import ModelFileError
+
+    started = time.perf_counter()
+    try:
+        encoder = TwoTowerEncoder()
+        encoder.encode(["an open microwave"])
+    except ModelFileError as error:
+        return _row("image-text encoder", False, True, str(error), "pip install onnxruntime")
+    detail = f"{encoder.name} (read in {1000 * (time.perf_counter() - started):.0f} ms)"
+    return _row("image-text encoder", True, True, detail)
 
 
 def _writable(folder: Any) -> tuple[bool, str]:

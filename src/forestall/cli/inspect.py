@@ -84,6 +84,7 @@ def check(
     task: str | None = None,
     memory: Path | None = None,
     threshold: float = 0.9,
+    states: str = "given",
     as_json: Json = False,
 ) -> int:
     """Judge a stored observation of your own before a subtask.
@@ -97,6 +98,7 @@ def check(
         task: the task's name, so that its own demonstrations are preferred.
         memory: a demonstration file; the ready-made one of the task by default.
         threshold: alarm when no demonstration reaches this score.
+        states: given (as the folder says), or read off its pictures: learned, clip.
         as_json: print JSON.
     """
     from forestall.cli.demos import load_memory
@@ -106,9 +108,11 @@ def check(
 
     if memory is None and task is None:
         raise InputError("give --memory FILE, or --task NAME to compare with its ready-made memory")
-    demonstrations, path = load_memory(memory, task or "", "oracle", as_json)
+    demonstrations, path = load_memory(memory, task or "", "learned", as_json)
     started = time.perf_counter()
-    graph, verdict, diagnosis = judge_stored(folder, subtask, task, demonstrations, threshold)
+    graph, verdict, diagnosis = judge_stored(
+        folder, subtask, task, demonstrations, threshold, states
+    )
     data = _verdict_json(verdict, diagnosis) | {
         "subtask": str(graph.subtask),
         "memory": path,

@@ -17,6 +17,7 @@ import forestall
 from forestall.cli.bench import bench
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
+from forestall.cli.encoder import encoder
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.run import run
@@ -32,6 +33,7 @@ for command in (run, tasks, scenarios, check, compare, doctor):
     app.command(command)
 app.command(demos)
 app.command(bench)
+app.command(encoder)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

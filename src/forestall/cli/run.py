@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
+    from forestall.build import RunConfig
     from forestall.types.demonstration import Demonstration
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
@@ -25,7 +26,9 @@ def run(
     seed: int = 0,
     out: Path | None = None,
     memory: Path | None = None,
-    states: str = "oracle",
+    states: str = "learned",
+    feature: str = "parts",
+    encoder: str = "hashed-words",
     renderer: str = "auto",
     threshold: float = 0.9,
     as_json: Json = False,
@@ -40,7 +43,10 @@ def run(
         seed: of the scene.
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         memory: a demonstration file; the ready-made one by default.
-        states: where object states come from: oracle (the simulator's).
+        states: where object states come from: learned (pixels, by the shipped encoder), clip
+            (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
+        feature: what a node's feature encodes: text, parts (category and states) or image.
+        encoder: of texts, for references and node features: hashed-words, two-tower, sentence.
         renderer: auto, embree, rays or gl.
         threshold: alarm when no demonstration reaches this score.
         as_json: print one record as JSON and nothing else on standard output.
@@ -51,12 +57,22 @@ def run(
     from forestall.report.page import write_page
     from forestall.report.record import RECORD_NAME, RunRecorder, read_record
 
-    config = RunConfig(task, scenario, strategy, seed, renderer, states=states, threshold=threshold)
+    config = RunConfig(
+        task,
+        scenario,
+        strategy,
+        seed,
+        renderer,
+        states=states,
+        feature=feature,
+        encoder=encoder,
+        threshold=threshold,
+    )
     prepared = prepare(config)
     name = None if prepared.scenario is None else prepared.scenario.name
     folder = out or _new_folder(prepared.loaded.task.name, name, strategy, seed)
     folder.mkdir(parents=True, exist_ok=True)
-    demonstrations, used = _memory(task, strategy, memory, states, quiet)
+    demonstrations, used = _memory(config, memory, quiet)
     page = folder / "index.html"
     recorder = RunRecorder(
         folder,
@@ -81,13 +97,13 @@ def _count(number: int, what: str) -> str:
 
 
 def _memory(
-    task: str, strategy: str, memory: Path | None, states: str, quiet: bool
+    config: RunConfig, memory: Path | None, quiet: bool
 ) -> tuple[list[Demonstration] | None, str | None]:
-    if strategy == "none":
+    if config.strategy == "none":
         return None, None
     from forestall.cli.demos import load_memory
 
-    return load_memory(memory, task, states, quiet)
+    return load_memory(memory, config.task, config.states, quiet, config.feature)
 
 
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:

@@ -1,8 +1,8 @@
 """One observed graph against many expected ones, computed together.
 
-Called by detection; calls prepare and matching. The numbers are those of `score.compare` to the
-last bit: the assignment is skipped only where every observed node has one best partner and no two
-the same, which makes that the only optimum.
+Called by detection; calls prepare, looks and matching. The numbers are those of `score.compare` to
+the last bit: the assignment is skipped only where every observed node has one best partner and no
+two the same, which makes that the only optimum.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.comparison.discrepancy import differences
+from forestall.comparison.looks import QUANTUM, Floats, Ints, Looks, joined, seen
 from forestall.comparison.matching import assign, match, parts, weights
-from forestall.comparison.options import DegreeScale, EmptyRule, ScoreConfig, StructureCount
+from forestall.comparison.options import (
+    DegreeScale,
+    EmptyRule,
+    Feature,
+    ScoreConfig,
+    StructureCount,
+)
 from forestall.comparison.prepare import (
-    QUANTUM,
-    Floats,
-    Ints,
     LabelTable,
     Prepared,
     prepare,
@@ -45,6 +49,7 @@ class _Stack:
     around: npt.NDArray[np.uint64]  # (R, M)
     degree: Ints  # (R, M)
     largest: Ints  # (R)
+    looks: Looks  # of the R * M places
     subtask: Ints  # (R)
     linked: npt.NDArray[np.bool_]  # (R * P * M * M) edge there
 
@@ -105,7 +110,7 @@ class BatchScorer:
         winner = int(np.argmax(self._batch(prepared, stack).score))
         nearest = references[winner]
         other = stack.graphs[winner]
-        matching = match(prepared, other, self._table.similarities())
+        matching = match(prepared, other, self._table.similarities(), self.config)
         return Verdict(
             decision=Decision.PROCEED,
             detector="score",
@@ -148,7 +153,7 @@ class BatchScorer:
         table = self._table.similarities()
         padded = np.zeros((len(table), len(table) + 1))
         padded[:, :-1] = table
-        partner, total = _partners(observed, stack, padded)
+        partner, total = _partners(observed, stack, padded, self.config)
         matched = (partner >= 0).sum(axis=1)
         subtasks = (
             padded[observed.subtask, stack.subtask]
@@ -212,18 +217,27 @@ def _stacked(graphs: Sequence[Prepared], predicates: int) -> _Stack:
         around=around,
         degree=degree,
         largest=degree.max(axis=1, initial=1),
+        looks=joined([g.looks for g in graphs], size),
         subtask=np.array([g.subtask for g in graphs], dtype=np.int64),
         linked=linked.ravel(),
     )
 
 
-def _partners(observed: Prepared, stack: _Stack, padded: Floats) -> tuple[Ints, Floats]:
+def _partners(
+    observed: Prepared, stack: _Stack, padded: Floats, config: ScoreConfig
+) -> tuple[Ints, Floats]:
     """(R, n) index of each observed node's partner or -1, and (R) their summed similarity."""
     size = len(observed.names)
     count = len(stack.graphs)
     if size == 0:
         return np.zeros((count, 0), dtype=np.int64), np.zeros(count)
-    similarity = padded[observed.labels][:, stack.labels].transpose(1, 0, 2)  # (R, n, M)
+    similarity = padded[observed.labels][:, stack.labels]  # (n, R, M)
+    if config.feature is Feature.IMAGE:
+        flat = similarity.reshape(size, -1)
+        similarity = seen(flat, observed.looks, stack.looks, config.image_floor).reshape(
+            similarity.shape
+        )
+    similarity = similarity.transpose(1, 0, 2)  # (R, n, M)
     r, i, j = np.nonzero(similarity)
     role = (observed.roles[i] == stack.roles[r, j]) & (observed.roles[i] > 0)
     same = observed.numbers[i] == stack.numbers[r, j]

@@ -112,7 +112,7 @@ def _states(
             f"{o} is {value}; the demonstration shows it {wanted[attribute]}",
         )
         for attribute, value in _node(observed, o).states
-        if attribute in config.attributes
+        if attribute not in config.ignored_attributes
         and value is not None
         and wanted.get(attribute) not in (None, value)
     ]

@@ -11,13 +11,10 @@ from enum import Enum
 from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-from forestall.vocabulary import ATTRIBUTES, Category, Vocabulary
+from forestall.vocabulary import Category, Vocabulary
 
-OBSERVABLE = tuple(a for a in ATTRIBUTES if a != "temperature")
-"""Attributes that a camera can tell."""
-
-MATERIAL = ("cooked", "dirty", "filled", "sliced")
-"""Attributes that matter to a task's outcome and not to whether a skill can run."""
+_NEEDED = ("broken", "open", "toggled")
+"""Attributes that decide whether a skill can run; the others only matter to a task's outcome."""
 
 _MECHANICAL = ("open", "toggled")
 _VESSELS = ("dish", "vessel")
@@ -46,16 +43,19 @@ def lift(graph: SceneGraph, subtask: Subtask, vocabulary: Vocabulary) -> frozens
     """
     roles = subtask.roles()
     moving = subtask.skill == "navigate_to_obj"
-    observable = [a for a in OBSERVABLE if not (moving and a in _MECHANICAL)]
     candidates = {Literal("hand_empty", ())}
     for variable, name in roles.items():
         node = graph.get(name)
         category = vocabulary.find(name if node is None else node.category)
         if node is None or category is None:
             continue
-        for attribute, value in node.states:
-            if value is not None and attribute in observable:
-                candidates.add(Literal(attribute, (variable,), value))
+        candidates |= {
+            Literal(attribute, (variable,), value)
+            for attribute, value in node.states
+            if value is not None
+            and _is_observable(attribute, vocabulary)
+            and not (moving and attribute in _MECHANICAL)
+        }
         if _is_vacatable(category):
             candidates.add(Literal("vacant", (variable,)))
         if category.pickupable:
@@ -79,7 +79,7 @@ def lift(graph: SceneGraph, subtask: Subtask, vocabulary: Vocabulary) -> frozens
 
 def kind_of(literal: Literal) -> Kind:
     """How far a lifted literal carries over."""
-    if literal.predicate in MATERIAL:
+    if literal.is_state and literal.predicate not in _NEEDED:
         return Kind.MATERIAL
     names = [a for a in literal.args if a != GRIPPER]
     if literal.predicate == "hand_empty" or any(not a.startswith("?") for a in names):
@@ -136,6 +136,12 @@ def _contents(
         and r.predicate in ("inside", "on_top_of")
         and r.subject not in roles.values()
     }
+
+
+def _is_observable(attribute: str, vocabulary: Vocabulary) -> bool:
+    """Whether a camera can tell; demonstrations may know attributes that this vocabulary lacks."""
+    known = vocabulary.attributes.get(attribute)
+    return known is not None and known.camera
 
 
 def _is_vacatable(category: Category) -> bool:

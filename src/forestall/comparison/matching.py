@@ -1,6 +1,6 @@
 """One-to-one matching of nodes (Hungarian) and the parts of the score, for one pair of graphs.
 
-Called by score and, for the matching itself, by batch; calls prepare.
+Called by score and, for the matching itself, by batch; calls prepare and looks.
 """
 
 from __future__ import annotations
@@ -10,8 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from forestall.comparison.options import DegreeScale, EmptyRule, ScoreConfig, StructureCount
-from forestall.comparison.prepare import QUANTUM, Floats, Ints, Prepared, ties
+from forestall.comparison.looks import QUANTUM, Floats, Ints, seen
+from forestall.comparison.options import (
+    DegreeScale,
+    EmptyRule,
+    Feature,
+    ScoreConfig,
+    StructureCount,
+)
+from forestall.comparison.prepare import Prepared, ties
 from forestall.types.verdict import ScoreParts
 
 TIE_SPAN = 2.0**16
@@ -46,9 +53,11 @@ def assign(weight: Floats, observed: Prepared, expected: Prepared) -> tuple[Ints
     return rows.astype(np.int64), columns.astype(np.int64)
 
 
-def match(observed: Prepared, expected: Prepared, table: Floats) -> Matching:
+def match(observed: Prepared, expected: Prepared, table: Floats, config: ScoreConfig) -> Matching:
     """Maximum total similarity, ties decided by surroundings; pairs below the floor are dropped."""
     similarity = table[np.ix_(observed.labels, expected.labels)]
+    if config.feature is Feature.IMAGE:
+        similarity = seen(similarity, observed.looks, expected.looks, config.image_floor)
     rows, columns = assign(weights(similarity, ties(observed, expected)), observed, expected)
     found = sorted(
         (int(i), int(j), float(similarity[int(i), int(j)]))

@@ -11,7 +11,6 @@ from enum import Enum
 
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import RELATIONS
-from forestall.vocabulary import ATTRIBUTES
 
 SUPPORTS = ("CounterTop", "DiningTable", "Floor", "Shelf", "TVStand")
 """Categories on which things merely stand."""
@@ -22,6 +21,7 @@ class Feature(Enum):
 
     TEXT = "text"  # one embedding of "category (states)"
     PARTS = "parts"  # an embedding of the category and one of the states, weighed apart
+    IMAGE = "image"  # what an image encoder made of the node's crop; "parts" where one has none
 
 
 class DegreeScale(Enum):
@@ -56,10 +56,15 @@ class ScoreConfig:
         floor: a pair of nodes below this cosine stays unmatched. With "parts" and hashed words the
             same category scores 0.85 or more whatever its states, another one 0.8 or less; with
             "text" a lower floor is needed for changed states to match.
+        image_floor: the same for two nodes with an image feature (feature "image"), where it alone
+            decides, whatever their categories: a cup may match a mug that looks like it. Instance
+            categories and known states that differ still keep nodes apart. Pairs of which one has
+            no image feature (the gripper, what was never seen, supports compared as one category)
+            are scored as "parts" has them, with `floor`.
         subtask_floor: the same for the two subtask nodes.
         state_changes_match: whether a node may match one of the same category whose known states
             differ; unobserved states agree with anything.
-        attributes: states that count. Temperature does not: a camera cannot see it.
+        ignored_attributes: states that do not count. A camera cannot see temperature.
         subtask_node: whether the subtask node counts; it matches only the other subtask node.
         degree_scale: D.
         structure_count: N.
@@ -82,9 +87,10 @@ class ScoreConfig:
     feature: Feature = Feature.PARTS
     state_weight: float = 0.15
     floor: float = 0.8
+    image_floor: float = 0.6
     subtask_floor: float = 0.6
     state_changes_match: bool = False
-    attributes: tuple[str, ...] = tuple(a for a in ATTRIBUTES if a != "temperature")
+    ignored_attributes: tuple[str, ...] = ("temperature",)
     subtask_node: bool = True
     degree_scale: DegreeScale = DegreeScale.LARGEST
     structure_count: StructureCount = StructureCount.MATCHED
@@ -101,7 +107,7 @@ class ScoreConfig:
     def __post_init__(self) -> None:
         if not (self.use_node or self.use_edge or self.use_structure):
             raise InputError("at least one of use_node, use_edge, use_structure must be on")
-        for floor in (self.floor, self.subtask_floor):
+        for floor in (self.floor, self.image_floor, self.subtask_floor):
             if not 0 < floor <= 1:
                 raise InputError(f"floor {floor} is not above 0 and at most 1")
         if not 0 <= self.state_weight < 1:

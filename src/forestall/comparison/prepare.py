@@ -1,29 +1,28 @@
 """Scene graphs as the arrays that scoring needs.
 
-Called by score and batch; calls options and the text encoder. Both ways of scoring read the same
-arrays and the same table of similarities, so that they agree to the last bit: similarities are
-rounded to multiples of 2^-24, which makes every sum of them exact in float64.
+Called by score and batch; calls options, looks and the text encoder. Both ways of scoring read the
+same arrays and the same table of similarities, so that they agree to the last bit: similarities
+are rounded to multiples of 2^-24, which makes every sum of them exact in float64.
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from forestall.comparison.looks import NEVER, QUANTUM, Floats, Ints, Looks, looks_of
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.interfaces import TextEncoder
 from forestall.types.facts import GRIPPER, category_of, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph
 
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
-
 SUPPORT = "support"
-QUANTUM = 2.0**-24
 _NUMBER = re.compile(r"-\d+\b")
 
 Label = tuple[str, tuple[tuple[str, str], ...], str]
@@ -53,6 +52,7 @@ class Prepared:
         around: (n) uint64 bit set of the node's surroundings, for ties.
         edges: (e, 3) subject, predicate, object as indices.
         degree: (n) compared edges at each node.
+        looks: image features of the nodes that have one; nothing unless they are compared.
         subtask: row of the subtask text in the label table, -1 for none.
         order: total order of graphs; the same score whichever is called observed rests on it.
     """
@@ -65,6 +65,7 @@ class Prepared:
     around: npt.NDArray[np.uint64]
     edges: Ints
     degree: Ints
+    looks: Looks
     subtask: int
     order: str
 
@@ -74,6 +75,7 @@ class LabelTable:
 
     def __init__(self, config: ScoreConfig, encoder: TextEncoder) -> None:
         self._config = config
+        self._apart = NEVER if config.feature is Feature.IMAGE else 0.0
         self._encoder = encoder
         self._labels: list[Label | str] = []
         self._index: dict[Label | str, int] = {}
@@ -93,7 +95,10 @@ class LabelTable:
         return found
 
     def similarities(self) -> Floats:
-        """(labels, labels) cosine of features, 0 where the two may not match."""
+        """(labels, labels) cosine of text features, 0 below the floor.
+
+        Where the two may not match it is 0, too, or `NEVER` when images are compared.
+        """
         old, size = len(self._table), len(self._labels)
         if old == size:
             return self._table
@@ -106,18 +111,18 @@ class LabelTable:
         return table
 
     def _similarity(self, a: Label | str, b: Label | str) -> float:
-        """Cosine of two features, rounded; 0 where the two may not match."""
+        """Cosine of two features, rounded; 0 or `NEVER` where the two may not match."""
         config = self._config
         if isinstance(a, str) or isinstance(b, str):
             both = isinstance(a, str) and isinstance(b, str)
             cosine = self._cosine(str(a), str(b)) if both else 0.0
             return self._floored(cosine, config.subtask_floor)
         if a[2] != b[2] or (a[0] == GRIPPER) != (b[0] == GRIPPER):
-            return 0.0
+            return self._apart
         common = {k for k, _ in a[1]} & {k for k, _ in b[1]}
         states_a, states_b = ([v for k, v in x[1] if k in common] for x in (a, b))
         if states_a != states_b and not config.state_changes_match:
-            return 0.0
+            return self._apart
         if config.feature is Feature.TEXT:
             texts = (_label_text(a[0], states_a), _label_text(b[0], states_b))
             return self._floored(self._cosine(*texts), config.floor)
@@ -185,6 +190,8 @@ def prepare(graph: SceneGraph, config: ScoreConfig, table: LabelTable) -> Prepar
         around[s] |= _bit(f">{p}{labels[o][0]}")
         around[o] |= _bit(f"<{p}{labels[s][0]}")
     rows = [table.row(label) for label in labels]
+    features = _features([groups[k][0] for k in keys], config)
+    seen = hashlib.blake2b(repr(features).encode()).hexdigest() if any(features) else ""
     text = subtask_text(graph) if config.subtask_node else None
     subtask = -1 if text is None else table.row(text)
     role_codes = [max(roles.get(n.id, 0) for n in groups[k]) for k in keys]
@@ -198,13 +205,24 @@ def prepare(graph: SceneGraph, config: ScoreConfig, table: LabelTable) -> Prepar
         around=np.array(around, dtype=np.uint64),
         edges=np.array(edges, dtype=np.int64).reshape(-1, 3),
         degree=np.array(degree, dtype=np.int64),
+        looks=looks_of(features),
         subtask=subtask,
-        order=repr((len(keys), labels, text, role_codes, [groups[k][0].id for k in keys], edges)),
+        order=repr(
+            (len(keys), labels, text, role_codes, [groups[k][0].id for k in keys], edges, seen)
+        ),
     )
 
 
 def _is_support(node: ObjectNode, config: ScoreConfig) -> bool:
     return node.category in config.supports
+
+
+def _features(nodes: Sequence[ObjectNode], config: ScoreConfig) -> list[bytes | None]:
+    """Image features that count: not those of supports that compare as one category."""
+    if config.feature is not Feature.IMAGE:
+        return []
+    apart = not config.generic_supports
+    return [n.feature if apart or not _is_support(n, config) else None for n in nodes]
 
 
 def _label(node: ObjectNode, config: ScoreConfig, roles: dict[str, int]) -> Label:
@@ -213,7 +231,8 @@ def _label(node: ObjectNode, config: ScoreConfig, roles: dict[str, int]) -> Labe
         category = GRIPPER
     elif config.generic_supports and _is_support(node, config):
         return (SUPPORT, (), "")
-    states = tuple((a, v) for a, v in node.states if v is not None and a in config.attributes)
+    ignored = config.ignored_attributes
+    states = tuple((a, v) for a, v in node.states if v is not None and a not in ignored)
     key = ""
     if category in config.instance_categories:
         role = roles.get(node.id, 0)

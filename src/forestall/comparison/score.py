@@ -54,7 +54,7 @@ def compare(
     """Score an observed graph against an expected one and say how they differ."""
     table = LabelTable(config, encoder)
     a, b = prepare(observed, config, table), prepare(expected, config, table)
-    matching = match(a, b, table.similarities())
+    matching = match(a, b, table.similarities(), config)
     matches = named_pairs(a, b, matching.pairs)
     return Comparison(
         parts(a, b, matching, config), matches, differences(observed, expected, matches, config)

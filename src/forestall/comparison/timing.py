@@ -13,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.comparison.batch import BatchScorer
-from forestall.comparison.options import ScoreConfig
+from forestall.comparison.options import Feature, ScoreConfig
 from forestall.errors import InputError
 from forestall.interfaces import TextEncoder
 from forestall.types.facts import GRIPPER
+from forestall.types.feature import quantised
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
-from forestall.vocabulary import ATTRIBUTES, Vocabulary, household
+from forestall.vocabulary import Vocabulary, household
 
 
 class DirectionEncoder:
@@ -37,11 +38,16 @@ class DirectionEncoder:
 
 
 def random_graph(
-    n_nodes: int, rng: np.random.Generator, vocabulary: Vocabulary | None = None
+    n_nodes: int,
+    rng: np.random.Generator,
+    vocabulary: Vocabulary | None = None,
+    feature_size: int = 0,
 ) -> SceneGraph:
     """A graph of `n_nodes` nodes (gripper included) with one relation for nearly every object.
 
-    Categories and states are drawn from the vocabulary; a state is unobserved one time in ten.
+    Categories and states are drawn from the vocabulary; a state is unobserved one time in ten. With
+    a `feature_size` objects have image features of that many numbers: a direction of the category
+    and at most as much noise; one in ten has none.
     """
     vocabulary = vocabulary or household()
     names = sorted(vocabulary.categories)
@@ -50,10 +56,11 @@ def random_graph(
     for category in rng.choice(names, size=n_nodes - 1).tolist():
         seen[category] = seen.get(category, 0) + 1
         states = tuple(
-            (a, None if rng.random() < 0.1 else str(rng.choice(ATTRIBUTES[a])))
+            (a, None if rng.random() < 0.1 else str(rng.choice(vocabulary.values(a))))
             for a in vocabulary[category].attributes
         )
-        nodes.append(ObjectNode(f"{category}-{seen[category]}", category, states))
+        look = random_feature(category, rng, feature_size) if feature_size else None
+        nodes.append(ObjectNode(f"{category}-{seen[category]}", category, states, feature=look))
     places = [n for n in nodes[1:] if vocabulary[n.category].receptacle is not None]
     relations = []
     for i, node in enumerate(nodes[1:]):
@@ -71,12 +78,21 @@ def random_graph(
     return SceneGraph(tuple(nodes), tuple(relations), subtask)
 
 
+def random_feature(category: str, rng: np.random.Generator, size: int) -> bytes | None:
+    """An image feature whose cosine with another one of its category is about a half or more."""
+    middle = np.random.default_rng(zlib.crc32(category.encode())).standard_normal(size)
+    look = middle + rng.uniform(0.2, 1.0) * rng.standard_normal(size)
+    return None if rng.random() < 0.1 else quantised(look)
+
+
 def score_times(
     n_references: int,
     n_nodes: int,
     seed: int,
     repeat: int = 10,
     encoder: TextEncoder | None = None,
+    feature: Feature = Feature.PARTS,
+    feature_size: int = 128,
 ) -> list[float]:
     """Seconds of each of `repeat` comparisons of a new graph with the same references.
 
@@ -88,6 +104,8 @@ def score_times(
         seed: of the graphs.
         repeat: how many new graphs are compared.
         encoder: embeds labels; random directions by default.
+        feature: what nodes are compared by.
+        feature_size: numbers of an image feature, where images are compared.
 
     Raises:
         InputError: fewer than one reference or two nodes.
@@ -95,12 +113,13 @@ def score_times(
     if n_references < 1 or n_nodes < 2:
         raise InputError("timing needs at least one reference and two nodes")
     rng = np.random.default_rng(seed)
-    references = [random_graph(n_nodes, rng) for _ in range(n_references)]
-    scorer = BatchScorer(ScoreConfig(), encoder or DirectionEncoder())
-    scorer.scores(random_graph(n_nodes, rng), references)
+    size = feature_size if feature is Feature.IMAGE else 0
+    references = [random_graph(n_nodes, rng, feature_size=size) for _ in range(n_references)]
+    scorer = BatchScorer(ScoreConfig(feature=feature), encoder or DirectionEncoder())
+    scorer.scores(random_graph(n_nodes, rng, feature_size=size), references)
     times = []
     for _ in range(repeat):
-        observed = random_graph(n_nodes, rng)
+        observed = random_graph(n_nodes, rng, feature_size=size)
         started = time.perf_counter()
         scorer.scores(observed, references)
         times.append(time.perf_counter() - started)

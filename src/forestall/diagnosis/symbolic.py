@@ -14,7 +14,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, Precondition, Reference, Verdict, Violation
-from forestall.vocabulary import ATTRIBUTES, Vocabulary
+from forestall.vocabulary import Vocabulary
 
 _UNDONE = {
     "open_obj": Literal("open", ("?target",), "closed"),
@@ -121,7 +121,7 @@ def explain(violation: Violation, graph: SceneGraph, subtask: Subtask) -> str:
     predicate = literal.predicate
     if predicate == "vacant" and literal.value == "true":
         return f"{_listed(graph, name)} {name}, which is empty {when} before {subtask}"
-    if predicate in ATTRIBUTES:
+    if literal.is_state:
         node = graph.get(name)
         now = node.state(predicate) if node is not None else None
         return (

@@ -2,11 +2,13 @@
 
 Called by the store; calls nothing. The steps of one run share most of their nodes and relations, so
 each distinct one is written once, in sorted order, and a graph is lists of rising positions in
-them. That makes reading fast: whatever rises is sorted and unique already.
+them. That makes reading fast: whatever rises is sorted and unique already. A node's image feature
+is written where it has one, so files with and without are of one format.
 """
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import zlib
@@ -153,7 +155,7 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
 
 
 def _node(data: dict[str, Any]) -> ObjectNode:
-    box, centroid = data["box_m"], data["centroid_m"]
+    box, centroid, feature = data["box_m"], data["centroid_m"], data.get("feature")
     return ObjectNode(
         id=data["id"],
         category=data["category"],
@@ -163,6 +165,7 @@ def _node(data: dict[str, Any]) -> ObjectNode:
         seen=Seen(data["seen"]),
         pixels=data["pixels"],
         last_seen_s=data["last_seen_s"],
+        feature=None if feature is None else base64.b64decode(feature, validate=True),
     )
 
 

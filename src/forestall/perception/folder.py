@@ -20,7 +20,7 @@ from forestall.errors import FileFormatError, UnknownNameError
 from forestall.perception.folder_files import MaskFile, read_depth, read_rgb, single_mask
 from forestall.types.facts import category_of, is_instance
 from forestall.types.observation import Detection, Frame, GripperState, Intrinsics, Observation
-from forestall.vocabulary import ATTRIBUTES, Vocabulary, household
+from forestall.vocabulary import Vocabulary, household
 
 OBSERVATION_FILE = "observation.json"
 OBSERVATION_FORMAT = 1
@@ -217,8 +217,8 @@ def _states(given: Mapping[str, str], category: str, vocabulary: Vocabulary) -> 
     for attribute, value in given.items():
         if attribute not in known:
             raise UnknownNameError(f"attribute of {category}", attribute, known)
-        if value not in ATTRIBUTES[attribute]:
-            raise UnknownNameError(f"value of {attribute}", value, ATTRIBUTES[attribute])
+        if value not in vocabulary.values(attribute):
+            raise UnknownNameError(f"value of {attribute}", value, vocabulary.values(attribute))
     return dict(given)
 
 

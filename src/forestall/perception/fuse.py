@@ -92,6 +92,7 @@ class SceneMemory:
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
                 known = {a: v for a, v in sighting.states.items() if v is not None}
                 track.states.update(known)
+                track.feature = sighting.feature or track.feature
         return set(shown)
 
     def _riding(self, name: str | None) -> set[str]:
@@ -330,6 +331,7 @@ class SceneMemory:
             seen=track.seen,
             pixels=track.pixels,
             last_seen_s=track.last_seen_s,
+            feature=track.feature,
         )
 
     # --- small questions ------------------------------------------------------------------------

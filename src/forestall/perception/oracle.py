@@ -6,13 +6,12 @@ could tell, so that it can be replaced by a learned estimator without changing w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from forestall.types.observation import Detection, Frame
-from forestall.vocabulary import ATTRIBUTES
 
 NOT_VISIBLE = ("temperature",)
-"""Attributes that no camera sees."""
+"""Attributes of the shipped vocabulary that no camera sees."""
 
 FINE = ("broken", "cooked", "dirty", "filled")
 """Attributes whose look is too small to be told on a distant object."""
@@ -24,14 +23,20 @@ class OracleStateEstimator:
     Args:
         states: instance name → its true attribute values.
         fine_pixels: mask size under which the fine attributes are not told.
+        not_visible: attributes that are never told.
     """
 
     name = "oracle states"
 
     def __init__(
-        self, states: Callable[[str], Mapping[str, str]], *, fine_pixels: int = 120
+        self,
+        states: Callable[[str], Mapping[str, str]],
+        *,
+        fine_pixels: int = 120,
+        not_visible: Collection[str] = NOT_VISIBLE,
     ) -> None:
         self._states = states
+        self._not_visible = frozenset(not_visible)
         self._fine_pixels = fine_pixels
 
     def estimate(
@@ -46,7 +51,7 @@ class OracleStateEstimator:
         true = self._states(detection.instance)
         small = int(detection.mask.sum()) < self._fine_pixels
         return {
-            a: None if small and a in FINE else true[a]
-            for a in ATTRIBUTES
-            if a in true and a not in NOT_VISIBLE
+            a: None if small and a in FINE else value
+            for a, value in true.items()
+            if a not in self._not_visible
         }

@@ -1,21 +1,23 @@
 """The perceiver: images, depth, masks and the hand in, one fused scene graph out.
 
-Called by the runtime; calls a segmenter and a state estimator (given by the constructor), then
-`unproject.py` for each frame and `fuse.py` once for each observation.
+Called by the runtime; calls a segmenter, a state estimator and, where there is one, an image
+encoder (given by the constructor), then `unproject.py` for each frame and `fuse.py` once for each
+observation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from forestall.errors import PerceptionError
-from forestall.interfaces import Segmenter, StateEstimator
+from forestall.errors import InputError, PerceptionError
+from forestall.interfaces import ImageEncoder, Segmenter, StateEstimator
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.naming import name_detections
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
-from forestall.perception.unproject import Points, clouds, label_image
+from forestall.perception.unproject import Cloud, Points, clouds, label_image
+from forestall.types.feature import quantised
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
@@ -31,6 +33,8 @@ class GraphPerceiver:
         vocabulary: categories, their attributes and what goes where.
         config: thresholds.
         scope_config: what a subtask's graph keeps.
+        image_encoder: gives every located thing the feature of its largest crop (f(v) of Eq. 1 as
+            an image embedding); without it nodes have none.
     """
 
     def __init__(
@@ -40,12 +44,15 @@ class GraphPerceiver:
         vocabulary: Vocabulary,
         config: PerceptionConfig | None = None,
         scope_config: ScopeConfig | None = None,
+        *,
+        image_encoder: ImageEncoder | None = None,
     ) -> None:
         self._segmenter = segmenter
         self._estimator = state_estimator
         self._vocabulary = vocabulary
         self._config = config or PerceptionConfig()
         self._scope = scope_config or ScopeConfig()
+        self._image_encoder = image_encoder
         self._memory = SceneMemory(vocabulary, self._config)
 
     def reset(self) -> None:
@@ -56,8 +63,8 @@ class GraphPerceiver:
         """Fuse an observation and return the whole graph as believed now.
 
         Raises:
-            PerceptionError: a frame without the masks that the segmenter needs, or a state
-                estimator that does not answer for every detection.
+            PerceptionError: a frame without the masks that the segmenter needs, a state
+                estimator or an image encoder that does not answer for every detection.
         """
         known: dict[str, Points] = {
             n: t.centroid_m for n, t in self._memory.tracks.items() if t.points_world_m is not None
@@ -77,8 +84,14 @@ class GraphPerceiver:
         return scope(graph, subtask, self._vocabulary, self._scope)
 
     def describe(self) -> Mapping[str, str]:
-        """Which segmenter and state estimator are used (goes into every record)."""
-        return {"segmenter": self._segmenter.name, "state_estimator": self._estimator.name}
+        """Which segmenter, state estimator and, if any, image encoder are used.
+
+        Goes into every record and every demonstration.
+        """
+        used = {"segmenter": self._segmenter.name, "state_estimator": self._estimator.name}
+        if self._image_encoder is not None:
+            used["features"] = self._image_encoder.name
+        return used
 
     def _view(self, frame: Frame, known: Mapping[str, Points]) -> View:
         detections = self._segmenter.segment(frame)
@@ -98,7 +111,30 @@ class GraphPerceiver:
             categories=tuple(d.category for d in detections),
             clouds=tuple(found),
             states=tuple(states),
+            features=self._features(frame, detections, found),
         )
+
+    def _features(
+        self, frame: Frame, detections: Sequence[Detection], found: Sequence[Cloud | None]
+    ) -> tuple[bytes | None, ...]:
+        """Quantised features of what has a cloud; nothing is encoded that no node could carry."""
+        encoder = self._image_encoder
+        located = [i for i, cloud in enumerate(found) if cloud is not None]
+        features: list[bytes | None] = [None] * len(detections)
+        if encoder is None or not located:
+            return tuple(features)
+        rows = encoder.encode_crops(frame.rgb, [detections[i].mask for i in located])
+        if rows.ndim != 2 or len(rows) != len(located):
+            raise PerceptionError(
+                f"the image encoder {encoder.name!r} gave an array of shape {rows.shape} for "
+                f"{len(located)} masks"
+            )
+        try:
+            for i, row in zip(located, rows, strict=True):
+                features[i] = quantised(row)
+        except InputError as error:
+            raise PerceptionError(f"the image encoder {encoder.name!r}: {error}") from error
+        return tuple(features)
 
     def _voxel_m(self, detection: Detection) -> float:
         category = self._vocabulary.find(detection.category)

@@ -24,17 +24,19 @@ class Sighting:
     category: str
     cloud: Cloud
     states: Mapping[str, str | None]
+    feature: bytes | None
 
 
 def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
     """Every located thing's sightings, oldest first."""
     found: dict[str, list[Sighting]] = {}
     for index, view in enumerate(views):
-        for name, category, cloud, states in zip(
-            view.ids, view.categories, view.clouds, view.states, strict=True
+        for name, category, cloud, states, feature in zip(
+            view.ids, view.categories, view.clouds, view.states, view.features, strict=True
         ):
             if cloud is not None:
-                found.setdefault(name, []).append(Sighting(index, category, cloud, states))
+                sighting = Sighting(index, category, cloud, states, feature)
+                found.setdefault(name, []).append(sighting)
     return found
 
 

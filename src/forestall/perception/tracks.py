@@ -38,6 +38,7 @@ class Track:
     first_seen_s: float = 0.0
     last_seen_s: float = 0.0
     states: dict[str, str | None] = field(default_factory=dict)
+    feature: bytes | None = None
     parent: Parent | None = None
     interior_seen: bool = False
     unmoved: bool = False
@@ -58,7 +59,10 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """One frame with what was found in it; `ids`, `clouds` and `states` by label."""
+    """One frame with what was found in it; everything but the frame and `labels` by label.
+
+    `features` are None without an image encoder and for what has no cloud.
+    """
 
     frame: Frame
     labels: Labels
@@ -66,6 +70,7 @@ class View:
     categories: tuple[str, ...]
     clouds: tuple[Cloud | None, ...]
     states: tuple[Mapping[str, str | None], ...]
+    features: tuple[bytes | None, ...]
 
 
 class Fate(IntEnum):

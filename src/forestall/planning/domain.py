@@ -292,7 +292,8 @@ def _under_hand(state: State, made: str) -> Place | None:
 
 def _replace(state: State, old: str, new: tuple[str, ...]) -> tuple[str, ...]:
     """Take a thing away and put what became of it at its place."""
-    kept = {a: v for a in ("temperature", "cooked") if (v := state.value(old, a)) is not None}
+    lasting = state.vocabulary.lasting
+    kept = {a: v for a in lasting if (v := state.value(old, a)) is not None}
     place = state.places.pop(old, None)
     del state.kinds[old]
     for key in [k for k in state.values if k[0] == old]:

@@ -12,7 +12,7 @@ from forestall.planning.problem import Atom
 from forestall.planning.relevance import Conjunction, Universe
 from forestall.planning.state import State, by_number
 from forestall.types.facts import category_of
-from forestall.vocabulary import ATTRIBUTES, Category
+from forestall.vocabulary import Category
 
 MAX_DEPTH = 3
 
@@ -89,7 +89,8 @@ class Layout:
 
     def becomes(self, name: str, attribute: str, value: str) -> Switch:
         """Atoms to add and to delete when an attribute takes a value."""
-        others = tuple(("is", name, attribute, v) for v in ATTRIBUTES[attribute] if v != value)
+        values = self.state.vocabulary.attributes[attribute].values
+        others = tuple(("is", name, attribute, v) for v in values if v != value)
         return (("is", name, attribute, value),), others
 
     def spoils(self, *names: str) -> tuple[Atom, ...]:
@@ -165,7 +166,8 @@ class Layout:
 
     def inherits(self, source: str, made: str) -> list[Change]:
         """What a made thing takes over from its source."""
-        changes = self.copies(source, made, "cooked") + self.tempers(source, made)
+        lasting = self.state.vocabulary.lasting
+        changes = [c for a in lasting for c in self.copies(source, made, a)]
         if source in self.watched and made in self.watched:
             changes.append(Change((("not", "intact", source),), (), (("intact", made),)))
         return changes
@@ -180,7 +182,7 @@ class Layout:
             return []
         return [
             Change((("is", source, attribute, v),), *self.becomes(target, attribute, v))
-            for v in ATTRIBUTES[attribute]
+            for v in self.state.vocabulary.attributes[attribute].values
         ]
 
     def initial(self) -> set[Atom]:

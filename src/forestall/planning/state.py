@@ -12,10 +12,9 @@ from itertools import product
 
 from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
-from forestall.vocabulary import ATTRIBUTES, Category, Device, Vocabulary
+from forestall.vocabulary import Category, Device, Vocabulary
 
 SUPPORTED = (
-    *ATTRIBUTES,
     "accessible",
     "blocking",
     "hand_empty",
@@ -27,7 +26,7 @@ SUPPORTED = (
     "unblocked",
     "vacant",
 )
-"""Predicates that a symbolic state decides; the others are geometry."""
+"""Predicates that a symbolic state decides besides attributes; the others are geometry."""
 
 CROWDED = 0.6
 """Share of a support's footprint from which on another one is preferred."""
@@ -237,7 +236,7 @@ class State:
         name = args[0]
         if predicate in ("inside", "on_top_of"):
             return self.places.get(name) == Place(predicate, args[-1])
-        if predicate in ATTRIBUTES:
+        if predicate in self.vocabulary.attributes:
             return self.value(name, predicate) == value
         if name not in self.kinds:
             return False

@@ -217,9 +217,10 @@ def _pour(layout: Layout, effects: Automatic, x: str) -> Iterator[Draft]:
 
 def _goal_atoms(layout: Layout, literal: Literal) -> list[Atom]:
     predicate, args, yes = literal.predicate, literal.args, literal.value != "false"
-    if predicate in ATTRIBUTES:
+    attributes = layout.state.vocabulary.attributes
+    if predicate in attributes:
         return [("is", args[0], predicate, literal.value)]
-    if predicate.removeprefix("not ") in ATTRIBUTES:
+    if predicate.removeprefix("not ") in attributes:
         return [("not", "is", args[0], predicate.removeprefix("not "), literal.value)]
     if predicate == "vacant" and yes:
         return [

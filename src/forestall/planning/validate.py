@@ -110,9 +110,10 @@ def bindings(state: State, goal: Goal) -> Iterator[dict[str, str]]:
             yield dict(zip(names, values, strict=True))
 
 
-def unsupported(literals: Iterable[Literal]) -> tuple[Literal, ...]:
+def unsupported(literals: Iterable[Literal], vocabulary: Vocabulary) -> tuple[Literal, ...]:
     """Literals that no symbolic state can decide (geometry, unknown predicates)."""
-    return tuple(x for x in literals if x.predicate not in SUPPORTED)
+    known = {*SUPPORTED, *vocabulary.attributes}
+    return tuple(x for x in literals if x.predicate not in known)
 
 
 def _relied_on(trace: Trace, goal: Goal) -> tuple[Literal, ...]:

@@ -66,7 +66,7 @@ class PlannerReplanner:
         attempts = _Attempts(time.perf_counter())
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
-        wanted = [x for x in diagnosis.must_change if not unsupported((x,))]
+        wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.vocabulary)]
         if not wanted:
             names = ", ".join(map(str, diagnosis.must_change))
             return self._ended(attempts, ReplanOutcome.UNSUPPORTED, f"no skill is about {names}")
@@ -189,7 +189,7 @@ def _hand(state: State, wanted: Sequence[Literal]) -> list[Literal]:
 
 def _as_it_is(state: State, literal: Literal) -> Literal | None:
     """A literal that holds, with category names replaced by the instances that make it hold."""
-    if unsupported((literal,)) or not state.holds(literal):
+    if unsupported((literal,), state.vocabulary) or not state.holds(literal):
         return None
     if literal.value == "false":
         return literal

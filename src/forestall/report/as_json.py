@@ -119,8 +119,8 @@ def boundary_json(
         "looks": b.looks,
         "image": image,
         "observation": None if b.observation is None else _observation(b.observation),
-        "graph": b.graph.to_json(),
-        "scoped": b.scoped.to_json(),
+        "graph": b.graph.to_json(features=False),
+        "scoped": b.scoped.to_json(features=False),
         "verdict": None if b.verdict is None else _verdict(b.verdict),
         "diagnosis": None if b.diagnosis is None else _diagnosis(b.diagnosis),
         "replan": None if b.replan is None else _replan(b.replan),
@@ -239,7 +239,7 @@ def _reference(reference: Reference) -> dict[str, Any]:
         "index": reference.index,
         "subtask": str(reference.subtask),
         "similarity": reference.similarity,
-        "graph": reference.graph.to_json(),
+        "graph": reference.graph.to_json(features=False),
         "later": [str(s) for s in reference.later],
     }
 

@@ -71,6 +71,11 @@ class Literal:
             return f"not {body}"
         return f"{body}={self.value}"
 
+    @property
+    def is_state(self) -> bool:
+        """Whether it gives an attribute a value; relations are true or false."""
+        return self.value not in ("true", "false")
+
     @classmethod
     def parse(cls, text: str) -> Literal:
         """Read the text form.

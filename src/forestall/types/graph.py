@@ -6,8 +6,9 @@ equal graphs have equal text, JSON and hashes.
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -59,7 +60,9 @@ class ObjectNode:
     """One object: stable id, category, states (value None: unobserved), where and how seen.
 
     `centroid_m` and `box_m` are None when the object was never located. `pixels` counts the mask
-    pixels of the newest view that saw it.
+    pixels of the newest view that saw it. `feature` is what an image encoder made of its largest
+    crop in the newest observation that saw it, as `types/feature.py` quantises it; which encoder
+    stands in the record of the perception.
     """
 
     id: str
@@ -70,9 +73,12 @@ class ObjectNode:
     seen: Seen = Seen.VISIBLE
     pixels: int = 0
     last_seen_s: float = 0.0
+    feature: bytes | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", tuple(sorted(self.states)))
+        if self.feature is not None and not any(self.feature):
+            raise InputError(f"the image feature of {self.id} is empty or all zero")
 
     def __hash__(self) -> int:
         return hash(self.id)
@@ -194,24 +200,17 @@ class SceneGraph:
         lines += [f"inside of {h}: unobserved" for h in self.hidden]
         return "\n".join(lines)
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+    def to_json(self, *, features: bool = True) -> dict[str, Any]:
+        """Plain data for JSON.
+
+        Args:
+            features: write image features (base64) where nodes have them. Records of runs leave
+                them out: graphs would grow by half, and those of a record are not compared again.
+        """
         return {
             "format": GRAPH_FORMAT,
             "subtask": None if self.subtask is None else str(self.subtask),
-            "nodes": [
-                {
-                    "id": n.id,
-                    "category": n.category,
-                    "states": dict(n.states),
-                    "centroid_m": n.centroid_m,
-                    "box_m": None if n.box_m is None else [n.box_m.low, n.box_m.high],
-                    "seen": n.seen.value,
-                    "pixels": n.pixels,
-                    "last_seen_s": n.last_seen_s,
-                }
-                for n in self.nodes
-            ],
+            "nodes": [_node_json(n, features) for n in self.nodes],
             "relations": [[r.subject, r.predicate, r.object] for r in self.relations],
             "hidden": list(self.hidden),
         }
@@ -258,8 +257,25 @@ def _vec(values: Iterable[float] | None) -> Vec3 | None:
     return (x, y, z)
 
 
+def _node_json(node: ObjectNode, features: bool) -> dict[str, Any]:
+    data = {
+        "id": node.id,
+        "category": node.category,
+        "states": dict(node.states),
+        "centroid_m": node.centroid_m,
+        "box_m": None if node.box_m is None else [node.box_m.low, node.box_m.high],
+        "seen": node.seen.value,
+        "pixels": node.pixels,
+        "last_seen_s": node.last_seen_s,
+    }
+    if features and node.feature is not None:
+        data["feature"] = base64.b64encode(node.feature).decode("ascii")
+    return data
+
+
 def _node(data: dict[str, Any]) -> ObjectNode:
     box = data.get("box_m")
+    feature = data.get("feature")
     low, high = (_vec(box[0]), _vec(box[1])) if box is not None else (None, None)
     return ObjectNode(
         id=str(data["id"]),
@@ -272,6 +288,7 @@ def _node(data: dict[str, Any]) -> ObjectNode:
         seen=Seen(data.get("seen", "visible")),
         pixels=int(data.get("pixels", 0)),
         last_seen_s=float(data.get("last_seen_s", 0.0)),
+        feature=None if feature is None else base64.b64decode(feature, validate=True),
     )
 
 

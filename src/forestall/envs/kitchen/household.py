@@ -16,7 +16,7 @@ from forestall.types.episode import Event
 from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Vec3
-from forestall.vocabulary import ATTRIBUTES, Category, Vocabulary
+from forestall.vocabulary import Category, Vocabulary
 
 FLOOR = "Floor"
 """Category that takes what falls."""
@@ -177,10 +177,11 @@ class Household:
         A thing without the attribute stays as it is.
 
         Raises:
-            UnknownNameError: the attribute has no such value.
+            UnknownNameError: there is no such attribute, or it has no such value.
         """
-        if value not in ATTRIBUTES.get(attribute, ()):
-            raise UnknownNameError(f"value of {attribute}", value, ATTRIBUTES.get(attribute, ()))
+        if value not in self.vocabulary.values(attribute):
+            known = self.vocabulary.values(attribute)
+            raise UnknownNameError(f"value of {attribute}", value, known)
         states = self._states.get(name, {})
         if attribute not in states:
             return False
@@ -224,7 +225,7 @@ class Household:
     def replace(self, old: str, category: str, count: int, what: str) -> list[str]:
         """Take a thing away and put prepared ones at its place; returns their names.
 
-        They take over its place, temperature, cooking state and spoilage.
+        They take over its place, spoilage, and the states that last (temperature, cooked).
 
         Args:
             old: what vanishes.
@@ -244,7 +245,7 @@ class Household:
             self._parents[name] = None
             if parent is not None:
                 self._attach(name, parent)
-            for attribute in ("temperature", "cooked"):
+            for attribute in self.vocabulary.lasting:
                 if attribute in states and attribute in self._states[name]:
                     self.set_state(name, attribute, states[attribute])
             if old in self._spoiled:

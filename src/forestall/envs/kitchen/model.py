@@ -27,7 +27,7 @@ from forestall.envs.kitchen.world import HAND_M, KitchenWorld
 from forestall.errors import SceneError
 from forestall.types.facts import category_of, is_instance
 from forestall.types.scene import SceneNeeds
-from forestall.vocabulary import ATTRIBUTES, Vocabulary
+from forestall.vocabulary import Vocabulary
 
 LAYOUTS = 10
 """How many layouts are tried for one seed."""
@@ -134,8 +134,8 @@ def _checked(
         if attribute not in vocabulary[category].attributes:
             known = ", ".join(vocabulary[category].attributes) or "none"
             raise SceneError(f"{name} has no attribute {attribute!r}: it has {known}")
-        if value not in ATTRIBUTES[attribute]:
-            known = ", ".join(ATTRIBUTES[attribute])
+        if value not in vocabulary.values(attribute):
+            known = ", ".join(vocabulary.values(attribute))
             raise SceneError(f"{attribute} of {name} cannot be {value!r}: known: {known}")
 
 

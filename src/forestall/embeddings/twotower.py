@@ -1,0 +1,198 @@
+"""The shipped image-text encoder: pictures and texts as unit vectors of one space, in onnxruntime.
+
+Called by the learned state estimator (crops against phrases), by retrieval and comparison (texts,
+crops) and by image-level comparison (whole frames); calls `crops.py` and `tokens.py`. It stands
+where the paper uses CLIP (Sec. 3); how it was trained and what it can and cannot do stands in
+docs/encoder.md.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.embeddings.crops import INPUT_PIXELS, crops, whole
+from forestall.embeddings.remembered import CropRows, TextRows, Vectors
+from forestall.embeddings.tokens import tokens, words
+from forestall.errors import InputError, ModelFileError
+from forestall.types.encoder import StateReading
+from forestall.types.observation import Mask, Rgb
+
+FORMAT = 1
+DESCRIPTION_NAME = "encoder.json"
+TOWERS = ("image", "text")
+_REMEDY = "reinstall forestall, or train one with `forestall encoder train`"
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What stands beside the two towers.
+
+    Args:
+        name: of the model, for records.
+        known: words that training has seen.
+        reading: how cosines are turned into answers.
+        training: how it was made.
+    """
+
+    name: str
+    known: frozenset[str]
+    reading: StateReading
+    training: Mapping[str, Any]
+
+    def as_json(self) -> dict[str, Any]:
+        """What the file holds."""
+        return {
+            "format": FORMAT,
+            "name": self.name,
+            "reading": asdict(self.reading),
+            "training": dict(self.training),
+            "known": sorted(self.known),
+        }
+
+    @classmethod
+    def read(cls, path: Path) -> Description:
+        """Read the file.
+
+        Raises:
+            ModelFileError: it is not there or does not say what it should.
+        """
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if data["format"] != FORMAT:
+                raise ModelFileError(
+                    f"{path} has format {data['format']}, this version reads {FORMAT}: {_REMEDY}"
+                )
+            return cls(
+                str(data["name"]),
+                frozenset(data["known"]),
+                StateReading(**data["reading"]),
+                dict(data["training"]),
+            )
+        except FileNotFoundError as error:
+            raise ModelFileError(f"there is no encoder at {path}: {_REMEDY}") from error
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, InputError) as error:
+            raise ModelFileError(f"{path} cannot be read ({error!r}): {_REMEDY}") from error
+
+
+def shipped() -> Path:
+    """The folder of the encoder that the package ships."""
+    return Path(str(files("forestall").joinpath("data/encoder")))
+
+
+class TwoTowerEncoder:
+    """Crops, frames and texts → unit rows (implements `ImageTextEncoder`).
+
+    Args:
+        folder: image.onnx, text.onnx and encoder.json; the shipped ones by default.
+        threads: of each tower; 0: as many as there are cores, four at most.
+
+    Raises:
+        ModelFileError: a file is missing or damaged, or this onnxruntime cannot run it.
+    """
+
+    def __init__(self, folder: Path | None = None, *, threads: int = 0) -> None:
+        folder = folder or shipped()
+        self.description = Description.read(folder / DESCRIPTION_NAME)
+        self.name = self.description.name
+        self.reading = self.description.reading
+        threads = threads or min(os.cpu_count() or 1, 4)
+        self._image, self._text = (_open(folder / f"{tower}.onnx", threads) for tower in TOWERS)
+        width = int(self._image.get_outputs()[0].shape[-1])
+        self._texts = TextRows(self._texts_anew, width)
+        self._crops = CropRows(self._crops_anew, width)
+
+    def readable(self, text: str) -> bool:
+        """Whether a text has anything that this encoder can read (Latin letters, digits)."""
+        return bool(words(text))
+
+    def encode(self, texts: Sequence[str]) -> Vectors:
+        """(n, d) float32 rows of unit length.
+
+        Raises:
+            InputError: a text without a Latin letter or digit.
+        """
+        return self._texts(texts)
+
+    def encode_crops(self, rgb: Rgb, masks: Sequence[Mask]) -> Vectors:
+        """(n, d) float32 unit rows, one for each mask.
+
+        What was asked of the same frame just before is not computed again, so that states and
+        features of one detection cost one pass.
+        """
+        return self._crops(rgb, masks)
+
+    def encode_image(self, rgb: Rgb) -> Vectors:
+        """(d,) float32 unit vector of a whole frame."""
+        row: Vectors = self.encode_pixels(whole(rgb)[None])[0]
+        return row
+
+    def encode_pixels(self, pixels: npt.NDArray[np.uint8]) -> Vectors:
+        """Unit rows of crops that are cut already, (n, INPUT_PIXELS, INPUT_PIXELS, 4).
+
+        Raises:
+            InputError: crops of another shape.
+        """
+        if pixels.shape[1:] != (INPUT_PIXELS, INPUT_PIXELS, 4):
+            raise InputError(
+                f"crops must be (n, {INPUT_PIXELS}, {INPUT_PIXELS}, 4), got {pixels.shape}"
+            )
+        values = pixels.transpose(0, 3, 1, 2).astype(np.float32)
+        rows: Vectors = self._image.run(None, {"input": values})[0]
+        return rows
+
+    def _texts_anew(self, texts: Sequence[str]) -> Vectors:
+        for text in texts:
+            if not self.readable(text):
+                raise InputError(
+                    f"the encoder {self.name!r} cannot read {text!r}: it knows Latin letters only"
+                )
+        rows: Vectors = self._text.run(None, {"input": tokens(texts, self.description.known)})[0]
+        return rows
+
+    def _crops_anew(self, rgb: Rgb, masks: Sequence[Mask]) -> Vectors:
+        return self.encode_pixels(crops(rgb, masks))
+
+
+def _open(path: Path, threads: int) -> Any:
+    """An onnxruntime session.
+
+    Raises:
+        ModelFileError: see `TwoTowerEncoder`.
+    """
+    if not path.is_file():
+        raise ModelFileError(f"there is no encoder at {path}: {_REMEDY}")
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise ModelFileError(
+            f"the encoder needs onnxruntime, which cannot be imported ({error}): "
+            "pip install onnxruntime"
+        ) from error
+    from onnxruntime.capi import onnxruntime_pybind11_state as states
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except (states.NotImplemented, states.InvalidGraph) as error:
+        raise ModelFileError(
+            f"onnxruntime {onnxruntime.__version__} cannot run {path} ({_first_line(error)}): "
+            "pip install --upgrade onnxruntime"
+        ) from error
+    except (states.Fail, states.InvalidProtobuf, states.RuntimeException) as error:
+        raise ModelFileError(f"{path} is damaged ({_first_line(error)}): {_REMEDY}") from error
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0]

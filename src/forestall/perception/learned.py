@@ -1,0 +1,122 @@
+"""States read off the pixels: each object's crop against phrases, the most fitting one wins.
+
+Called by the perceiver; calls an image-text encoder that is handed in. This is the paper's way of
+reading states (Sec. 3 "3D Scene Graph Construction": CLIP on the crop against a list of states for
+each category), with a calibrated confidence, and silence where that is too small: an object that
+is too far away, too hidden, or fits two phrases about as well is *unobserved*, never guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.errors import InputError
+from forestall.interfaces import ImageTextEncoder
+from forestall.types.observation import Detection, Frame
+from forestall.vocabulary import Vocabulary
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """One attribute of a category: its values, and a unit vector of the phrases for each."""
+
+    attribute: str
+    values: tuple[str, ...]
+    vectors: npt.NDArray[np.float32]
+
+
+class LearnedStateEstimator:
+    """Argmax over phrases with a calibrated confidence (implements `StateEstimator`).
+
+    Args:
+        encoder: embeds crops and phrases, and says how its cosines are to be read.
+        vocabulary: which attributes a category has, and the phrases for their values.
+
+    Raises:
+        InputError: a phrase that the encoder cannot read.
+    """
+
+    def __init__(self, encoder: ImageTextEncoder, vocabulary: Vocabulary) -> None:
+        self._encoder = encoder
+        self._vocabulary = vocabulary
+        self._questions: dict[str, tuple[Question, ...]] = {}
+        self.name = f"learned states ({encoder.name})"
+
+    def estimate(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> Sequence[Mapping[str, str | None]]:
+        """See the Protocol; a category that the vocabulary lacks has no states."""
+        asked = [
+            (i, self.questions(d.category))
+            for i, d in enumerate(detections)
+            if self._vocabulary.find(d.category) is not None
+        ]
+        asked = [(i, questions) for i, questions in asked if questions]
+        least = self._encoder.reading.least_area
+        large = [(i, q) for i, q in asked if np.count_nonzero(detections[i].mask) >= least]
+        rows = self._encoder.encode_crops(frame.rgb, [detections[i].mask for i, _ in large])
+        out: list[Mapping[str, str | None]] = [{} for _ in detections]
+        for i, questions in asked:
+            out[i] = {q.attribute: None for q in questions}
+        for (i, questions), row in zip(large, rows, strict=True):
+            out[i] = self._answers(questions, row)
+        return out
+
+    def questions(self, category: str) -> tuple[Question, ...]:
+        """What can be asked of a category.
+
+        Raises:
+            InputError: a phrase that the encoder cannot read.
+        """
+        name = self._vocabulary[category].name
+        found = self._questions.get(name)
+        if found is None:
+            found = tuple(
+                Question(a, self._vocabulary.values(a), self._vectors(name, a))
+                for a in self._vocabulary[name].attributes
+                if self._vocabulary.attributes[a].camera
+            )
+            self._questions[name] = found
+        return found
+
+    def probabilities(self, question: Question, rows: npt.NDArray[np.float32]) -> Floats:
+        """(n, values) confidence in each value of a question for (n, d) crops."""
+        reading = self._encoder.reading
+        logits = rows.astype(np.float64) @ question.vectors.T.astype(np.float64)
+        logits *= reading.scale / reading.divisor(question.attribute)
+        logits -= logits.max(axis=1, keepdims=True)
+        weights = np.exp(logits)
+        shares: Floats = weights / weights.sum(axis=1, keepdims=True)
+        return shares
+
+    def _answers(
+        self, questions: Sequence[Question], row: npt.NDArray[np.float32]
+    ) -> Mapping[str, str | None]:
+        found: dict[str, str | None] = {}
+        for question in questions:
+            confidence = self.probabilities(question, row[None])[0]
+            best = int(confidence.argmax())
+            sure = confidence[best] >= self._encoder.reading.least_confidence(question.attribute)
+            found[question.attribute] = question.values[best] if sure else None
+        if found.get("broken") == "broken":  # shards are neither clean nor full
+            return {a: "broken" if a == "broken" else None for a in found}
+        return found
+
+    def _vectors(self, category: str, attribute: str) -> npt.NDArray[np.float32]:
+        rows = []
+        for value in self._vocabulary.values(attribute):
+            phrases = self._vocabulary.phrases(category, attribute, value)
+            try:
+                mean = self._encoder.encode(phrases).mean(axis=0)
+            except InputError as error:
+                raise InputError(
+                    f"phrases for {attribute}={value} of {category}: {error}"
+                ) from error
+            rows.append(mean / np.linalg.norm(mean))
+        return np.stack(rows)

@@ -1,0 +1,1 @@
+"""Making the shipped image-text encoder: pictures, training, export, measurement (tool layer)."""

@@ -1,0 +1,250 @@
+"""Pictures on disk: crops with what is true of them, in shards that are each made whole.
+
+Called by the command line; calls `scenes.py`. A shard is a few scenes; it is written under another
+name first, so that what is there is complete and a killed job goes on where it was. The shards of
+a folder depend on nothing but their seeds and the options that stand beside them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, field
+from importlib.resources import files
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.config import PICTURE_SEEDS
+from forestall.embeddings.crops import MARGIN, crop, whole
+from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.perception.segmenters import InstanceSegmenter
+from forestall.training.scenes import Artist, Picture, SceneConfig
+from forestall.vocabulary import ATTRIBUTES, Vocabulary, household, parse_category
+
+Progress = Callable[[int, int, str], None]
+
+STORED_PIXELS = 80
+STORED_MARGIN = MARGIN * STORED_PIXELS / 64
+"""Wider than what the encoder is given, which leaves room for shifted and scaled windows."""
+
+SCENES_PER_SHARD = 20
+OPTIONS_NAME = "pictures.json"
+
+SELDOM = {
+    "CounterTop": 0.1,
+    "DiningTable": 0.2,
+    "Drawer": 0.7,
+    "Cabinet": 0.7,
+    "Floor": 0.1,
+    "Shelf": 0.2,
+    "Sink": 0.3,
+    "StoveBurner": 0.35,
+    "StoveKnob": 0.15,
+    "TVStand": 0.3,
+}
+"""Share of the crops that are kept of what is in view all the time."""
+
+VALUES = {a: {v: k for k, v in enumerate(values)} for a, values in ATTRIBUTES.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class PictureConfig:
+    """What a folder of pictures holds.
+
+    Args:
+        train: scenes to train on.
+        development: scenes to fit temperature and thresholds on.
+        test: scenes that the reported figures come from.
+        unseen: scenes with things that are not trained on.
+        scene: how scenes are drawn.
+        renderer: by name.
+    """
+
+    train: int = 1060
+    development: int = 100
+    test: int = 160
+    unseen: int = 60
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    renderer: str = "embree"
+
+    def __post_init__(self) -> None:
+        for split in PICTURE_SEEDS:
+            if not 0 < getattr(self, split) <= 100_000:
+                raise InputError(f"{split}: from 1 to 100,000 scenes, got {getattr(self, split)}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crops:
+    """n crops and what is true of them.
+
+    Args:
+        pixels: (n, STORED_PIXELS, STORED_PIXELS, 4) uint8.
+        category: (n) names; "" for a whole frame.
+        values: (n, attributes) int8, the index of the value in ATTRIBUTES, -1 where it has none.
+        area: (n) mask pixels in the frame.
+        frame: (n) which frame of the shard (or of the split) it was cut from.
+    """
+
+    pixels: npt.NDArray[np.uint8]
+    category: npt.NDArray[np.str_]
+    values: npt.NDArray[np.int8]
+    area: npt.NDArray[np.int32]
+    frame: npt.NDArray[np.int32]
+
+
+def make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> None:
+    """Make every shard that is not there yet, development and test first.
+
+    Raises:
+        InputError: the folder holds pictures made with other options.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    _same_options(out, config)
+    todo = [
+        (split, first)
+        for split in ("development", "test", "unseen", "train")
+        for first in range(0, getattr(config, split), SCENES_PER_SHARD)
+    ]
+    left = [job for job in todo if not _path(out, *job).exists()]
+    progress(len(todo) - len(left), len(todo), "pictures")
+    if not left:
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(make_shard, out, config, *job): job for job in left}
+        try:
+            for done, future in enumerate(as_completed(futures), len(todo) - len(left) + 1):
+                future.result()
+                progress(done, len(todo), futures[future][0])
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def make_shard(out: Path, config: PictureConfig, split: str, first: int) -> Path:
+    """Draw the scenes of one shard and write it."""
+    vocabulary = household() if split != "unseen" else unseen_things()
+    artist = Artist(vocabulary, config.scene, config.renderer)
+    count = min(SCENES_PER_SHARD, getattr(config, split) - first)
+    rows: list[_Row] = []
+    frames = 0
+    for seed in range(PICTURE_SEEDS[split] + first, PICTURE_SEEDS[split] + first + count):
+        for picture in artist.pictures(seed):
+            found = _rows(picture, frames)
+            artist.shown.update(r.category for r in found if r.category)
+            rows += found
+            frames += 1
+    path = _path(out, split, first)
+    path.parent.mkdir(exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.part")
+    with partial.open("wb") as file:
+        np.savez(
+            file,
+            pixels=np.stack([r.pixels for r in rows]),
+            category=np.array([r.category for r in rows]),
+            values=np.array([r.values for r in rows], dtype=np.int8),
+            area=np.array([r.area for r in rows], dtype=np.int32),
+            frame=np.array([r.frame for r in rows], dtype=np.int32),
+        )
+    os.replace(partial, path)
+    return path
+
+
+def read(folder: Path, split: str) -> Crops:
+    """Every crop of a split, shards in order.
+
+    Raises:
+        UnknownNameError: no such split.
+        FileFormatError: no pictures there, or a damaged shard.
+    """
+    if split not in PICTURE_SEEDS:
+        raise UnknownNameError("split", split, PICTURE_SEEDS)
+    paths = sorted((folder / split).glob("*.npz"))
+    if not paths:
+        raise FileFormatError(
+            f"{folder} holds no {split} pictures: make them with `forestall encoder pictures`"
+        )
+    shards = []
+    frames = 0
+    for path in paths:
+        try:
+            with np.load(path) as data:
+                shard = Crops(**{name: data[name] for name in Crops.__dataclass_fields__})
+        except (OSError, ValueError, KeyError) as error:
+            raise FileFormatError(f"{path} cannot be read ({error}): remove it") from error
+        shard.frame[:] += frames
+        frames = int(shard.frame[-1]) + 1
+        shards.append(shard)
+    return Crops(
+        **{
+            name: np.concatenate([getattr(s, name) for s in shards])
+            for name in Crops.__dataclass_fields__
+        }
+    )
+
+
+def unseen_file() -> dict[str, Any]:
+    """What the file of unseen things and questions says."""
+    text = files("forestall").joinpath("data/encoder_zero_shot.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def unseen_things() -> Vocabulary:
+    """The household with the things that the encoder is not trained on."""
+    tables = unseen_file()["categories"]
+    return household().extended({n: parse_category(n, t) for n, t in tables.items()})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Row:
+    pixels: npt.NDArray[np.uint8]
+    category: str
+    values: list[int]
+    area: int
+    frame: int
+
+
+def _rows(picture: Picture, frame: int) -> list[_Row]:
+    """The crops of one picture, the whole frame last."""
+    rgb = picture.frame.rgb
+    rng = np.random.default_rng([picture.seed, 2, picture.view])
+    rows = []
+    for d in InstanceSegmenter().segment(picture.frame):
+        if rng.uniform() >= SELDOM.get(d.category, 1.0) or d.instance is None:
+            continue
+        pixels = crop(rgb, d.mask, STORED_PIXELS, STORED_MARGIN)
+        values = _values(picture.states[d.instance])
+        rows.append(_Row(pixels, d.category, values, int(d.mask.sum()), frame))
+    rows.append(_Row(whole(rgb, STORED_PIXELS), "", _values({}), int(rgb[..., 0].size), frame))
+    return rows
+
+
+def _values(states: Mapping[str, str]) -> list[int]:
+    return [VALUES[a][states[a]] if a in states else -1 for a in ATTRIBUTES]
+
+
+def _path(out: Path, split: str, first: int) -> Path:
+    return out / split / f"{first:06d}.npz"
+
+
+def _same_options(out: Path, config: PictureConfig) -> None:
+    """See that the folder's options are these, how many scenes there are apart."""
+    path = out / OPTIONS_NAME
+    wanted: dict[str, Any] = asdict(config) | {"values": ATTRIBUTES, "seldom": SELDOM}
+    wanted = json.loads(json.dumps(wanted))
+    if path.exists():
+        there = json.loads(path.read_text(encoding="utf-8"))
+        free = set(PICTURE_SEEDS)
+        differing = [k for k in wanted if k not in free and there.get(k) != wanted[k]]
+        if differing:
+            raise InputError(
+                f"{out} holds pictures made with other options ({', '.join(differing)}): "
+                "choose another folder or remove it"
+            )
+    path.write_text(json.dumps(wanted, indent=2), encoding="utf-8")

@@ -1,0 +1,123 @@
+"""What the encoder was never trained on: other things, and other questions about known ones.
+
+Called by the command line; calls the learned state estimator. The things and questions stand in
+`data/encoder_zero_shot.toml`, in the form in which a user's task file states its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.attributes import parse_attribute
+from forestall.embeddings.twotower import TwoTowerEncoder
+from forestall.training.examine import Vectors, answers
+from forestall.training.measure import measure
+from forestall.training.page import ZeroShot
+from forestall.training.shards import Crops, unseen_file, unseen_things
+from forestall.vocabulary import Vocabulary
+
+
+@dataclass(frozen=True, slots=True)
+class Alias:
+    """A question that was not trained on, and where its truth can be read off.
+
+    Args:
+        attribute: of the question.
+        of: the attribute that decides it.
+        values: new value → the values that it stands for.
+        categories: of which it is asked.
+    """
+
+    attribute: str
+    of: str
+    values: Mapping[str, tuple[str, ...]]
+    categories: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """The household with things and questions that were not trained on."""
+
+    vocabulary: Vocabulary
+    categories: tuple[str, ...]
+    aliases: tuple[Alias, ...]
+
+
+def unseen() -> Unseen:
+    """Read the shipped file."""
+    data = unseen_file()
+    attributes = {n: parse_attribute(n, t, None) for n, t in data["attributes"].items()}
+    aliases = tuple(
+        Alias(name, t["attribute"], {k: tuple(v) for k, v in t["is"].items()}, tuple(t["of"]))
+        for name, t in data["same_as"].items()
+    )
+    vocabulary = unseen_things().extended({}, attributes)
+    return Unseen(vocabulary, tuple(data["categories"]), aliases)
+
+
+def new_things(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[ZeroShot]:
+    """Known attributes of things that were not trained on."""
+    found = unseen()
+    chosen = np.isin(crops.category, found.categories)
+    part = _chosen(crops, chosen)
+    said = answers(encoder, rows[chosen], part, found.vocabulary)
+    return [
+        ZeroShot(
+            found.vocabulary[str(g.category)].words,
+            str(g.attribute),
+            g.figures.n,
+            g.figures.balanced,
+            g.figures.answered.value,
+        )
+        for g in measure(said).pairs
+    ]
+
+
+def new_questions(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[ZeroShot]:
+    """Other questions about known things."""
+    found = unseen()
+    order = list(found.vocabulary.attributes)
+    out = []
+    for alias in found.aliases:
+        old = crops.values[:, order.index(alias.of)]
+        new = _translated(old, alias, found.vocabulary)
+        chosen = np.isin(crops.category, alias.categories) & (new >= 0)
+        values = np.full((int(chosen.sum()), len(order)), -1, dtype=np.int8)
+        values[:, order.index(alias.attribute)] = new[chosen]
+        part = replace(_chosen(crops, chosen), values=values)
+        said = answers(encoder, rows[chosen], part, _asking(found.vocabulary, alias))
+        measured = measure(said, {alias.attribute: found.vocabulary.values(alias.attribute)})
+        for g in measured.pairs:
+            words = found.vocabulary[str(g.category)].words
+            asked = f"{alias.attribute} ({' / '.join(g.values)})"
+            figures = g.figures
+            out.append(ZeroShot(words, asked, figures.n, figures.balanced, figures.answered.value))
+    return out
+
+
+def _translated(
+    old: npt.NDArray[np.int8], alias: Alias, vocabulary: Vocabulary
+) -> npt.NDArray[np.int8]:
+    """The new attribute's value for each old one, -1 where there is none."""
+    values = vocabulary.values(alias.of)
+    new = np.full(len(old), -1, dtype=np.int8)
+    for k, value in enumerate(vocabulary.values(alias.attribute)):
+        new[np.isin(old, [values.index(v) for v in alias.values[value]])] = k
+    return new
+
+
+def _asking(vocabulary: Vocabulary, alias: Alias) -> Vocabulary:
+    """The vocabulary in which the categories of an alias have its attribute only."""
+    changed = {
+        c: replace(vocabulary[c], attributes=(alias.attribute,), defaults=())
+        for c in alias.categories
+    }
+    return vocabulary.extended(changed)
+
+
+def _chosen(crops: Crops, rows: npt.NDArray[np.bool_]) -> Crops:
+    return Crops(**{name: getattr(crops, name)[rows] for name in Crops.__dataclass_fields__})
