@@ -89,7 +89,7 @@ def test_the_main_job(memory: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert call([*arguments, *options]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["success"] is True
-    assert data["perception"]["state_estimator"] == "oracle states"
+    assert data["perception"]["state_estimator"] == "learned states (forestall two-tower 1)"
     assert data["replans"] >= 1
     alarm = next(a for a in data["alarms"] if a["must_change"])
     assert "Bowl-1" in alarm["cause"]

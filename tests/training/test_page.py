@@ -166,7 +166,7 @@ def test_every_text_is_escaped() -> None:
         answers_of(20, wrong=2, silent=2, category=evil),
         {evil: evil},
         synonyms=[Synonym(evil, evil, evil, 0.5, False, evil)],
-        zero_shot=[ZeroShot(evil, evil, 3, None, None)],
+        zero_shot=[ZeroShot(evil, evil, 3, None, None, None)],
     )
     assert "<script" not in text
     assert Page(text).text.count(evil) >= 9
@@ -182,13 +182,13 @@ def test_words_and_zero_shot_are_tables() -> None:
                 Synonym("beaker", "Bowl", "Cup", 0.448, False, "meaning"),
                 Synonym("icebox", "Fridge", "Fridge", 0.61, True, "meaning"),
             ],
-            zero_shot=[ZeroShot("rolled up or flat", "rolled", 1300, 0.613, 0.5)],
+            zero_shot=[ZeroShot("rolled up or flat", "rolled", 1300, 0.613, 0.5, 0.587)],
         )
     )
     assert "meaning 1 of 2 right, 50.0 %" in page.text
     assert page.text.index("beaker") < page.text.index("icebox")  # the wrong ones first
     assert "✕ Bowl , wrong Cup 0.45" in page.text
-    assert "rolled up or flat rolled 1,300 61.3 % 50.0 %" in page.text
+    assert "rolled up or flat rolled 1,300 61.3 % 50.0 % 58.7 %" in page.text
     assert "seed 17" in page.text
     plain = Page(page_of(answers_of(20, 0, 0)))
     assert "Words that it has not read" not in plain.text

@@ -70,6 +70,10 @@ class PerceptionConfig:
             missing detection means something.
         interior_share: share of a container's depth samples that must be seen for its inside to
             count as observed.
+        glimpse_share: views of a thing with a smaller share of its largest view's pixels, in one
+            observation, say nothing about its states.
+        changes_in_hand: attributes that may change while a thing is held (it is poured from); of
+            the others, a contradiction is taken for the look of the fingers.
         same_place_m: distance over which an untracked detection is the same object as before.
     """
 
@@ -114,6 +118,8 @@ class PerceptionConfig:
     unmoved_share: float = 0.8
     expected_pixels: float = 4.0
     interior_share: float = 0.1
+    glimpse_share: float = 0.5
+    changes_in_hand: tuple[str, ...] = ("filled",)
     same_place_m: float = 0.3
 
 

@@ -15,7 +15,7 @@ from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.relations import directions
-from forestall.perception.sightings import gather, placing
+from forestall.perception.sightings import gather, in_hand, placing, readings
 from forestall.perception.support import Parent, parents
 from forestall.perception.tracks import (
     Fate,
@@ -89,9 +89,11 @@ class SceneMemory:
             self._place(track, np.concatenate(points), fate.get(name))
             track.pixels = found[name][-1].cloud.pixels
             track.last_seen_s = time_s
+            read = readings(found[name], self._config.glimpse_share)
+            if name == self._held:
+                read = in_hand(read, track.states, self._config.changes_in_hand)
+            track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
-                known = {a: v for a, v in sighting.states.items() if v is not None}
-                track.states.update(known)
                 track.feature = sighting.feature or track.feature
         return set(shown)
 

@@ -40,6 +40,33 @@ def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
     return found
 
 
+def readings(sightings: Sequence[Sighting], share: float) -> dict[str, str]:
+    """What one observation says about a thing's states; the larger the view, the more it counts.
+
+    Args:
+        sightings: of one thing, at least one.
+        share: a view with less than this share of the largest one's pixels says nothing: a handle
+            at the edge of a picture is no judge of a mug that another picture shows whole.
+    """
+    least = share * max(s.cloud.pixels for s in sightings)
+    found: dict[str, str] = {}
+    for sighting in sorted(sightings, key=lambda s: s.cloud.pixels):
+        if sighting.cloud.pixels >= least:
+            found.update((a, v) for a, v in sighting.states.items() if v is not None)
+    return found
+
+
+def in_hand(
+    read: Mapping[str, str], known: Mapping[str, str | None], changing: Collection[str]
+) -> dict[str, str]:
+    """What is believed of what was read off a thing between the fingers.
+
+    They hide half of it and look like stains and cracks, and a thing in the hand neither breaks nor
+    gets dirty: only attributes in `changing` may contradict what was known before.
+    """
+    return {a: v for a, v in read.items() if a in changing or known.get(a) in (None, v)}
+
+
 def placing(
     found: Mapping[str, Sequence[Sighting]], held: str | None, riding: Collection[str], gap_m: float
 ) -> dict[str, list[Sighting]]:

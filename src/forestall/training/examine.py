@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from forestall.embeddings.crops import INPUT_PIXELS
 from forestall.embeddings.twotower import TwoTowerEncoder
+from forestall.errors import InputError
 from forestall.perception.learned import LearnedStateEstimator, Question
 from forestall.training.measure import Answers
 from forestall.training.shards import Crops
@@ -105,6 +106,8 @@ def _part(
 
 
 def _joined(parts: list[Answers]) -> Answers:
+    if not parts:
+        raise InputError("there is nothing to ask: no crop with a state that is known")
     most = max(p.probability.shape[1] for p in parts)
     padded = [np.pad(p.probability, ((0, 0), (0, most - p.probability.shape[1]))) for p in parts]
     joined = {

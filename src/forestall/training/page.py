@@ -60,13 +60,24 @@ class Synonym:
 
 @dataclass(frozen=True, slots=True)
 class ZeroShot:
-    """Figures for an attribute or a category that was not trained on; None: there is no figure."""
+    """Figures for an attribute or a category that was not trained on; None: there is no figure.
+
+    Args:
+        what: a thing.
+        attribute: of it.
+        n: answers.
+        balanced: balanced accuracy of what was answered.
+        answered: share answered.
+        forced: balanced accuracy if everything had been answered; a value that is never answered
+            does not drop out of this one.
+    """
 
     what: str
     attribute: str
     n: int
     balanced: float | None
     answered: float | None
+    forced: float | None
 
 
 @dataclass(frozen=True, slots=True)

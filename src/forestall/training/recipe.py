@@ -37,7 +37,7 @@ class ReadingConfig:
         least_threshold: no threshold is lower than this.
     """
 
-    target: float = 0.99
+    target: float = 0.985
     least_area: int = 40
     least_threshold: float = 0.7
 

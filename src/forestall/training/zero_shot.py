@@ -15,10 +15,10 @@ import numpy.typing as npt
 from forestall.attributes import parse_attribute
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.training.examine import Vectors, answers
-from forestall.training.measure import measure
+from forestall.training.measure import Answers, Group, Values, measure
 from forestall.training.page import ZeroShot
 from forestall.training.shards import Crops, unseen_file, unseen_things
-from forestall.vocabulary import Vocabulary
+from forestall.vocabulary import ATTRIBUTES, Vocabulary
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,17 +63,13 @@ def new_things(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[Ze
     """Known attributes of things that were not trained on."""
     found = unseen()
     chosen = np.isin(crops.category, found.categories)
+    if not chosen.any():
+        return []
     part = _chosen(crops, chosen)
     said = answers(encoder, rows[chosen], part, found.vocabulary)
     return [
-        ZeroShot(
-            found.vocabulary[str(g.category)].words,
-            str(g.attribute),
-            g.figures.n,
-            g.figures.balanced,
-            g.figures.answered.value,
-        )
-        for g in measure(said).pairs
+        _row(g, found.vocabulary[str(g.category)].words, str(g.attribute), forced)
+        for g, forced in _pairs(said, ATTRIBUTES)
     ]
 
 
@@ -86,17 +82,29 @@ def new_questions(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list
         old = crops.values[:, order.index(alias.of)]
         new = _translated(old, alias, found.vocabulary)
         chosen = np.isin(crops.category, alias.categories) & (new >= 0)
+        if not chosen.any():
+            continue
         values = np.full((int(chosen.sum()), len(order)), -1, dtype=np.int8)
         values[:, order.index(alias.attribute)] = new[chosen]
         part = replace(_chosen(crops, chosen), values=values)
         said = answers(encoder, rows[chosen], part, _asking(found.vocabulary, alias))
-        measured = measure(said, {alias.attribute: found.vocabulary.values(alias.attribute)})
-        for g in measured.pairs:
-            words = found.vocabulary[str(g.category)].words
+        values_of = {alias.attribute: found.vocabulary.values(alias.attribute)}
+        for g, forced in _pairs(said, values_of):
             asked = f"{alias.attribute} ({' / '.join(g.values)})"
-            figures = g.figures
-            out.append(ZeroShot(words, asked, figures.n, figures.balanced, figures.answered.value))
+            out.append(_row(g, found.vocabulary[str(g.category)].words, asked, forced))
     return out
+
+
+def _pairs(said: Answers, values: Values) -> list[tuple[Group, float | None]]:
+    """Each attribute and category, and its balanced accuracy had everything been answered."""
+    forced = measure(replace(said, answered=np.ones_like(said.answered)), values).pairs
+    given = measure(said, values).pairs
+    return [(g, f.figures.balanced) for g, f in zip(given, forced, strict=True)]
+
+
+def _row(group: Group, what: str, asked: str, forced: float | None) -> ZeroShot:
+    figures = group.figures
+    return ZeroShot(what, asked, figures.n, figures.balanced, figures.answered.value, forced)
 
 
 def _translated(

@@ -1,0 +1,100 @@
+"""`forestall encoder` and the choice of where states come from: errors, without pictures."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from forestall.build import (
+    RunConfig,
+    make_image_encoder,
+    make_state_estimator,
+    make_strategy,
+    prepare,
+)
+from forestall.cli.main import call
+from forestall.embeddings.twotower import TwoTowerEncoder
+from forestall.errors import InputError, UnknownNameError
+from forestall.training import shards
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.graph import ObjectNode, SceneGraph
+from forestall.types.plan import Subtask
+from forestall.vocabulary import ATTRIBUTES, household
+
+
+@pytest.fixture
+def pictures(tmp_path: Path) -> Path:
+    """Six grey crops of closed fridges, which say nothing."""
+    folder = tmp_path / "pictures"
+    (folder / "test").mkdir(parents=True)
+    values = np.full((6, len(ATTRIBUTES)), -1, dtype=np.int8)
+    values[:, list(ATTRIBUTES).index("open")] = 0
+    np.savez(
+        folder / "test" / "000000.npz",
+        pixels=np.full((6, 80, 80, 4), 127, dtype=np.uint8),
+        category=np.array(["Fridge"] * 6),
+        values=values,
+        area=np.full(6, 900, dtype=np.int32),
+        frame=np.arange(6, dtype=np.int32),
+    )
+    return folder
+
+
+def test_missing_pictures_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["encoder", "test", "--pictures", str(tmp_path), "--quiet"]) == 2
+    assert "forestall encoder pictures" in capsys.readouterr().err
+
+
+def test_a_missing_model_is_named(
+    tmp_path: Path, pictures: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["encoder", "test", "--pictures", str(pictures), "--model", str(tmp_path / "no")]
+    assert call([*arguments, "--quiet"]) == 3
+    assert "there is no encoder at" in capsys.readouterr().err
+
+
+def test_figures_tables_and_page_of_the_shipped_encoder(
+    tmp_path: Path, pictures: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert call(["encoder", "test", "--pictures", str(pictures), "--out", str(out), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["encoder"] == TwoTowerEncoder().name
+    assert data["states"]["overall"]["figures"]["n"] == 6
+    assert data["size_bytes"] < 10_000_000
+    assert {w["group"] for w in data["words"]} == {"spelling", "meaning"}
+    assert shards.read(pictures, "test").frame.tolist() == list(range(6))
+    names = {p.name for p in out.iterdir()}
+    assert names >= {"index.html", "measurement.md", "figures.csv", "confusion.csv"}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"states": "given"}, "states of a run 'given'.*learned"),
+        ({"feature": "pixels"}, "node feature 'pixels'.*image"),
+        ({"encoder": "word2vec"}, "encoder 'word2vec'.*two-tower"),
+    ],
+)
+def test_unknown_names_are_refused_before_anything_is_built(
+    change: dict[str, str], message: str
+) -> None:
+    with pytest.raises(UnknownNameError, match=message):
+        prepare(RunConfig("heat-potato", **change))
+
+
+def test_states_are_learned_when_nothing_is_said() -> None:
+    assert RunConfig("heat-potato").states == "learned"
+    name = make_state_estimator("learned", household()).name
+    assert name == f"learned states ({TwoTowerEncoder().name})"
+    assert make_image_encoder("two-tower") is make_image_encoder("two-tower")
+
+
+def test_a_memory_without_looks_is_refused_for_the_feature_image() -> None:
+    subtask = Subtask.parse("pick_up(Potato)")
+    graph = SceneGraph((ObjectNode("Potato-1", "Potato"),), subtask=subtask)
+    step = DemonstrationStep(0, subtask, graph, graph)
+    config = RunConfig("heat-potato", feature="image")
+    with pytest.raises(InputError, match=r"node features of demonstration .* come from nothing"):
+        make_strategy(config, household(), [Demonstration("heat-potato", "kitchen-1", 1, (step,))])
