@@ -60,7 +60,9 @@ class ScoreConfig:
             decides, whatever their categories: a cup may match a mug that looks like it. Instance
             categories and known states that differ still keep nodes apart. Pairs of which one has
             no image feature (the gripper, what was never seen, supports compared as one category)
-            are scored as "parts" has them, with `floor`.
+            are scored as "parts" has them, with `floor`. On development pictures of the shipped
+            encoder 95 % of pairs of one category and state lie above 0.54, 95 % of pairs of two
+            categories below 0.49.
         subtask_floor: the same for the two subtask nodes.
         state_changes_match: whether a node may match one of the same category whose known states
             differ; unobserved states agree with anything.
@@ -87,7 +89,7 @@ class ScoreConfig:
     feature: Feature = Feature.PARTS
     state_weight: float = 0.15
     floor: float = 0.8
-    image_floor: float = 0.6
+    image_floor: float = 0.55
     subtask_floor: float = 0.6
     state_changes_match: bool = False
     ignored_attributes: tuple[str, ...] = ("temperature",)
