@@ -28,7 +28,7 @@ from forestall.benchmark.goals import TruthGoalChecker
 from forestall.comparison.options import Feature
 from forestall.comparison.preconditions import MiningConfig, mine, violations
 from forestall.comparison.score import BatchScorer, ScoreConfig
-from forestall.config import DEMONSTRATION_SEEDS
+from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.envs.kitchen.environment import KitchenEnvironment
@@ -147,6 +147,8 @@ def prepare(config: RunConfig) -> Prepared:
         raise InputError(f"seed {config.seed} is negative; seeds are 0, 1, 2, ...")
     if config.seed >= DEMONSTRATION_SEEDS and config.strategy != "none":
         raise InputError(f"seed {config.seed}: from {DEMONSTRATION_SEEDS} on are demonstrations")
+    if config.seed >= PICTURE_SEEDS["train"]:
+        raise InputError(f"seed {config.seed}: from {PICTURE_SEEDS['train']} on are pictures")
     prepared = Prepared(config, loaded, scenario)
     if scenario is not None:
         try:

@@ -18,7 +18,7 @@ PICTURE_SEEDS = {
     "test": 4_000_000,
     "unseen": 5_000_000,
 }
-"""First seed of the encoder's pictures of each split; each has a million of its own."""
+"""First seed of the encoder's pictures of each split; no run and no demonstration reaches them."""
 
 
 def cache_dir() -> Path:

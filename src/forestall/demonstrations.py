@@ -166,6 +166,8 @@ def ready_made(
 def _key(task: str, states: str, feature: str) -> str:
     digest = hashlib.blake2b(digest_size=8)
     parts = [forestall.__version__, states, feature, KITCHENS_PER_TASK, repr(load_task(task))]
+    if states == "clip":
+        parts.append(os.environ.get("FORESTALL_CLIP"))
     digest.update(json.dumps(parts).encode())
     root = Path(forestall.__file__).parent
     models = (root / "data" / "encoder").glob("*")

@@ -89,6 +89,18 @@ def test_a_damaged_tower_is_named(copy: Path, kept: int) -> None:
         TwoTowerEncoder(copy)
 
 
+def test_an_empty_tower_is_named(copy: Path) -> None:
+    (copy / "image.onnx").write_bytes(b"")
+    with pytest.raises(ModelFileError, match=r"image\.onnx is damaged"):
+        TwoTowerEncoder(copy)
+
+
+def test_towers_that_were_swapped_are_named(copy: Path) -> None:
+    shutil.copy(copy / "text.onnx", copy / "image.onnx")
+    with pytest.raises(ModelFileError, match=r"image\.onnx is no image tower"):
+        TwoTowerEncoder(copy)
+
+
 def test_an_operator_that_this_onnxruntime_lacks_is_named(copy: Path) -> None:
     path = copy / "image.onnx"
     data = path.read_bytes()

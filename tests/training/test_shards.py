@@ -60,7 +60,8 @@ def test_things_that_are_not_trained_on_are_drawn_too(folder: Path) -> None:
 
 def test_other_options_do_not_mix_with_what_is_there(tmp_path: Path) -> None:
     shards._same_options(tmp_path, SMALL)
-    shards._same_options(tmp_path, PictureConfig(9, 1, 1, 1, SMALL.scene, "embree"))
+    with pytest.raises(InputError, match="made for 1 train scenes, now 9"):
+        shards._same_options(tmp_path, PictureConfig(9, 1, 1, 1, SMALL.scene, "embree"))
     with pytest.raises(InputError, match=r"other options \(scene\)"):
         shards._same_options(tmp_path, PictureConfig(1, 1, 1, 1, SceneConfig(views=3), "embree"))
 
@@ -71,6 +72,7 @@ def test_bad_input(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="test: from 1"):
         PictureConfig(test=0)
     (tmp_path / "test").mkdir()
-    (tmp_path / "test" / "000000.npz").write_bytes(b"not a shard")
-    with pytest.raises(FileFormatError, match=r"000000.npz cannot be read.*remove it"):
-        read(tmp_path, "test")
+    for damage in (b"not a shard", b"PK\x03\x04 half of one"):
+        (tmp_path / "test" / "000000.npz").write_bytes(damage)
+        with pytest.raises(FileFormatError, match=r"000000.npz cannot be read.*remove it"):
+            read(tmp_path, "test")

@@ -86,6 +86,8 @@ def _encoder() -> dict[str, Any]:
     """Whether the shipped encoder can be read and run."""
     import time
 
+    import numpy as np
+
     from forestall.embeddings.twotower import TwoTowerEncoder
     from forestall.errors import ModelFileError
 
@@ -93,8 +95,9 @@ def _encoder() -> dict[str, Any]:
     try:
         encoder = TwoTowerEncoder()
         encoder.encode(["an open microwave"])
+        encoder.encode_image(np.zeros((48, 64, 3), dtype=np.uint8))
     except ModelFileError as error:
-        return _row("image-text encoder", False, True, str(error), "pip install onnxruntime")
+        return _row("image-text encoder", False, True, str(error))
     detail = f"{encoder.name} (read in {1000 * (time.perf_counter() - started):.0f} ms)"
     return _row("image-text encoder", True, True, detail)
 

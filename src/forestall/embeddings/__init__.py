@@ -1,4 +1,4 @@
-"""Encoders of texts (and later images); each stands behind a Protocol of `interfaces.py`."""
+"""Encoders of texts and of images; each stands behind a Protocol of `interfaces.py`."""
 
 from forestall.embeddings.hashed import HashedTextEncoder
 

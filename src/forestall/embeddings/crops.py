@@ -65,7 +65,7 @@ def square(rgb: Rgb, mask: Mask, middle: tuple[float, float], side: float, pixel
     if x0 < x1 and y0 < y1:
         inner = window[y0 - first_y : y1 - first_y, x0 - first_x : x1 - first_x]
         inner[..., :3] = rgb[y0:y1, x0:x1]
-        inner[..., 3] = mask[y0:y1, x0:x1].view(np.uint8) * np.uint8(255)
+        inner[..., 3] = np.where(mask[y0:y1, x0:x1], 255, 0)
     dx, dy = left - first_x, top - first_y
     # RGBX: the four channels are scaled alike (RGBA would scale colours weighted by the mask)
     picture = Image.frombuffer("RGBX", (size, size), window.tobytes(), "raw", "RGBX", 0, 1)

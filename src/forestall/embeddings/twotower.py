@@ -106,9 +106,21 @@ class TwoTowerEncoder:
         self.reading = self.description.reading
         threads = threads or min(os.cpu_count() or 1, 4)
         self._image, self._text = (_open(folder / f"{tower}.onnx", threads) for tower in TOWERS)
+        self._check_towers(folder)
         width = int(self._image.get_outputs()[0].shape[-1])
         self._texts = TextRows(self._texts_anew, width)
         self._crops = CropRows(self._crops_anew, width)
+
+    def _check_towers(self, folder: Path) -> None:
+        """See that each file is the tower that its name says."""
+        for tower, session, wanted in (
+            ("image", self._image, ("tensor(float)", 4)),
+            ("text", self._text, ("tensor(int32)", 3)),
+        ):
+            given = session.get_inputs()[0]
+            if (given.type, len(given.shape)) != wanted:
+                path = folder / f"{tower}.onnx"
+                raise ModelFileError(f"{path} is no {tower} tower of this encoder: {_REMEDY}")
 
     def readable(self, text: str) -> bool:
         """Whether a text has anything that this encoder can read (Latin letters, digits)."""
@@ -192,7 +204,14 @@ def _open(path: Path, threads: int) -> Any:
             f"onnxruntime {onnxruntime.__version__} cannot run {path} ({_first_line(error)}): "
             "pip install --upgrade onnxruntime"
         ) from error
-    except (states.Fail, states.InvalidProtobuf, states.RuntimeException) as error:
+    except (
+        states.Fail,
+        states.InvalidArgument,
+        states.InvalidProtobuf,
+        states.NoModel,
+        states.NoSuchFile,
+        states.RuntimeException,
+    ) as error:
         raise ModelFileError(f"{path} is damaged ({_first_line(error)}): {_REMEDY}") from error
 
 

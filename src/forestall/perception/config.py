@@ -72,8 +72,8 @@ class PerceptionConfig:
             count as observed.
         glimpse_share: views of a thing with a smaller share of its largest view's pixels, in one
             observation, say nothing about its states.
-        changes_in_hand: attributes that may change while a thing is held (it is poured from); of
-            the others, a contradiction is taken for the look of the fingers.
+        changes_in_hand: attributes that may change while a thing is held (it is poured from,
+            opened, turned on); a contradiction in another one is taken for the look of fingers.
         same_place_m: distance over which an untracked detection is the same object as before.
     """
 
@@ -119,7 +119,7 @@ class PerceptionConfig:
     expected_pixels: float = 4.0
     interior_share: float = 0.1
     glimpse_share: float = 0.5
-    changes_in_hand: tuple[str, ...] = ("filled",)
+    changes_in_hand: tuple[str, ...] = ("filled", "open", "toggled")
     same_place_m: float = 0.3
 
 

@@ -61,8 +61,8 @@ def in_hand(
 ) -> dict[str, str]:
     """What is believed of what was read off a thing between the fingers.
 
-    They hide half of it and look like stains and cracks, and a thing in the hand neither breaks nor
-    gets dirty: only attributes in `changing` may contradict what was known before.
+    They hide half of it and look like stains and cracks, and a thing in the hand does not break,
+    get dirty or cook: only attributes in `changing` may contradict what was known before.
     """
     return {a: v for a, v in read.items() if a in changing or known.get(a) in (None, v)}
 

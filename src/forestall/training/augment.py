@@ -33,13 +33,6 @@ def augment(stored: Tensor, generator: Generator) -> Tensor:
     return torch.cat([colour, mask], 1)
 
 
-def centred(stored: Tensor) -> Tensor:
-    """The middle of stored crops, unchanged: what the encoder is given when it is used."""
-    edge = (stored.shape[1] - INPUT_PIXELS) // 2
-    inner = stored[:, edge : edge + INPUT_PIXELS, edge : edge + INPUT_PIXELS]
-    return inner.permute(0, 3, 1, 2).float()
-
-
 def _uniform(n: int, low: float, high: float, generator: Generator) -> Tensor:
     return low + (high - low) * torch.rand(n, generator=generator)
 

@@ -22,7 +22,7 @@ from torch import Tensor
 
 from forestall.embeddings.tokens import tokens, words
 from forestall.errors import InputError
-from forestall.training.augment import augment, centred
+from forestall.training.augment import augment
 from forestall.training.network import TwoTowers
 from forestall.training.shards import Crops
 from forestall.training.texts import ANY_THING, PLAIN, SAYINGS, Writer
@@ -286,16 +286,6 @@ def _follow(average: TwoTowers, towers: TwoTowers, keep: float) -> None:
             kept.lerp_(new, 1 - keep)
         else:
             kept.copy_(new)
-
-
-@torch.no_grad()
-def embed(towers: TwoTowers, crops: Crops, batch: int = 512) -> npt.NDArray[np.float32]:
-    """Unit vectors of stored crops, as they are."""
-    found = [
-        towers.image(centred(torch.from_numpy(crops.pixels[i : i + batch]))).numpy()
-        for i in range(0, len(crops.pixels), batch)
-    ]
-    return np.concatenate(found)
 
 
 def facts(config: TrainConfig, towers: TwoTowers) -> dict[str, Any]:

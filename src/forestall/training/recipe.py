@@ -70,12 +70,13 @@ def train(
         ) from error
     config = fit.TrainConfig(seed=recipe.seed, steps=recipe.steps, batch=recipe.batch)
     crops = shards.read(pictures, "train")
+    options = shards.options(pictures)
     towers, history = fit.train(crops, vocabulary, config, progress)
     network.export(towers, out)
     made = {
         "crops": int((crops.category != "").sum()),
         "frames": int((crops.category == "").sum()),
-        "pictures": json.loads((pictures / shards.OPTIONS_NAME).read_text(encoding="utf-8")),
+        "pictures": options,
         **fit.facts(config, towers),
         "last losses": history[-1],
     }

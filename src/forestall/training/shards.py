@@ -17,6 +17,7 @@ from importlib.resources import files
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,7 @@ from forestall.config import PICTURE_SEEDS
 from forestall.embeddings.crops import MARGIN, crop, whole
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.segmenters import InstanceSegmenter
+from forestall.report.record import replace_file
 from forestall.training.scenes import Artist, Picture, SceneConfig
 from forestall.vocabulary import ATTRIBUTES, Vocabulary, household, parse_category
 
@@ -174,9 +176,9 @@ def read(folder: Path, split: str) -> Crops:
     frames = 0
     for path in paths:
         try:
-            with np.load(path) as data:
+            with path.open("rb") as file, np.load(file) as data:
                 shard = Crops(**{name: data[name] for name in Crops.__dataclass_fields__})
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
             raise FileFormatError(f"{path} cannot be read ({error}): remove it") from error
         shard.frame[:] += frames
         frames = int(shard.frame[-1]) + 1
@@ -233,18 +235,39 @@ def _path(out: Path, split: str, first: int) -> Path:
     return out / split / f"{first:06d}.npz"
 
 
+def options(folder: Path) -> dict[str, Any]:
+    """What a folder of pictures was made with.
+
+    Raises:
+        FileFormatError: the file that says so is missing or damaged.
+    """
+    path = folder / OPTIONS_NAME
+    try:
+        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise FileFormatError(f"{path} cannot be read ({error})") from error
+    return data
+
+
 def _same_options(out: Path, config: PictureConfig) -> None:
     """See that the folder's options are these, how many scenes there are apart."""
     path = out / OPTIONS_NAME
     wanted: dict[str, Any] = asdict(config) | {"values": ATTRIBUTES, "seldom": SELDOM}
     wanted = json.loads(json.dumps(wanted))
     if path.exists():
-        there = json.loads(path.read_text(encoding="utf-8"))
+        there = options(out)
         free = set(PICTURE_SEEDS)
+        for split in sorted(free):
+            old, new = there.get(split, 0), getattr(config, split)
+            if old != new and (new < old or old % SCENES_PER_SHARD):
+                raise InputError(
+                    f"{out} was made for {old} {split} scenes, now {new} are asked for: a folder "
+                    f"grows, from a multiple of {SCENES_PER_SHARD}; choose another one"
+                )
         differing = [k for k in wanted if k not in free and there.get(k) != wanted[k]]
         if differing:
             raise InputError(
                 f"{out} holds pictures made with other options ({', '.join(differing)}): "
                 "choose another folder or remove it"
             )
-    path.write_text(json.dumps(wanted, indent=2), encoding="utf-8")
+    replace_file(path, json.dumps(wanted, indent=2).encode())
