@@ -47,6 +47,20 @@ class Job:
         """What makes an episode the same one."""
         return json.dumps([forestall.__version__, *asdict(self).values()])
 
+    @property
+    def config(self) -> RunConfig:
+        """The run of this episode; its pictures are not kept."""
+        return RunConfig(
+            self.task,
+            self.scenario,
+            self.strategy,
+            self.seed,
+            states=self.states,
+            feature=self.feature,
+            encoder=self.encoder,
+            keep_observations=False,
+        )
+
 
 def parse_seeds(text: str) -> range:
     """Read "100:120" (100 to 119) or "7".
@@ -87,17 +101,7 @@ def jobs_for(
         for seed in seeds
     ]
     for job in {(j.task, j.scenario, j.strategy): j for j in jobs}.values():
-        prepare(
-            RunConfig(
-                job.task,
-                job.scenario,
-                job.strategy,
-                job.seed,
-                states=job.states,
-                feature=job.feature,
-                encoder=job.encoder,
-            )
-        )
+        prepare(job.config)
     return jobs
 
 
@@ -132,18 +136,8 @@ def survey(
 
 def run_job(job: Job) -> dict[str, Any]:
     """Run one episode and keep what is counted."""
-    config = RunConfig(
-        job.task,
-        job.scenario,
-        job.strategy,
-        job.seed,
-        states=job.states,
-        feature=job.feature,
-        encoder=job.encoder,
-        keep_observations=False,
-    )
     demonstrations = None if job.strategy == "none" else _demonstrations(job)
-    record = run_episode(prepare(config), demonstrations)
+    record = run_episode(prepare(job.config), demonstrations)
     data = record_json(record, page=None, images={})
     kept = ("success", "weak_success", "failures", "end", "replans", "simulated_s", "reasoning_s")
     return (
