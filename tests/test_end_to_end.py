@@ -62,7 +62,7 @@ def run_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, 
     "scenario",
     [
         pytest.param(s, marks=pytest.mark.xdist_group(load_scenario(s).task))
-        for s in scenario_names()
+        for s in scenario_names("examples")
     ],
 )
 def test_every_scenario_from_pixels(

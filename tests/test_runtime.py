@@ -29,7 +29,7 @@ from forestall.types.plan import Subtask
 from forestall.types.verdict import Decision, ReplanOutcome
 from forestall.vocabulary import Vocabulary
 
-ON_FLAT_WORLDS = sorted(set(scenario_names()) - {"knife-blocked"})
+ON_FLAT_WORLDS = sorted(set(scenario_names("examples")) - {"knife-blocked"})
 """A flat world knows no place in front of another, so nothing can be moved out of the way there."""
 
 

@@ -18,7 +18,7 @@ from forestall.types.episode import EpisodeRecord, Event, SkillOutcome
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
 
@@ -181,6 +181,15 @@ class ImageEncoder(Protocol):
         """(d,) float32 of unit length: the whole picture."""
 
 
+class Captioner(Protocol):
+    """Says in a few sentences what a picture shows."""
+
+    name: str
+
+    def caption(self, observation: Observation, scoped: SceneGraph) -> str:
+        """`scoped` is what perception made of the observation; a model that sees ignores it."""
+
+
 class ImageTextEncoder(ImageEncoder, TextEncoder, Protocol):
     """Pictures and texts in one space, as CLIP has them."""
 
@@ -251,15 +260,19 @@ class Strategy(Protocol):
     """Where a run may be interrupted; one loop serves all strategies."""
 
     name: str
+    looks_after: LooksAfter
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Called with the perceived scene before each subtask."""
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
-        """Called after each subtask."""
+        """Called after each subtask: with what is seen then, if it `looks_after` subtasks."""
 
     def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
-        """Called when the plan is finished; may ask for a further plan."""
+        """Called when the plan is finished; may ask for a further plan.
+
+        With what is seen then, if it `looks_after` subtasks or episodes.
+        """
 
 
 class Listener(Protocol):

@@ -2,7 +2,8 @@
 
 Calls: command line and build → here → types. A task file holds the goal, the nominal plan, what
 the scene needs, and, when it speaks of things that the project does not know, their categories. A
-scenario file names a task and adds faults. Both are checked against the vocabulary when loaded.
+scenario file names a task and adds faults; a file of a set holds several scenarios of one task. All
+are checked against the vocabulary when loaded.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -21,10 +23,16 @@ from forestall.benchmark.faults import Fault
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.types.facts import DERIVED, RELATIONS, category_of, is_instance
 from forestall.types.facts import Literal as Fact
-from forestall.types.plan import Plan
+from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.vocabulary import Vocabulary, household, parse_category
+
+SETS = ("examples", "robofail", "irreversible", "harmless")
+"""Sets of shipped scenarios; each but the first is a folder of its own."""
+
+END = "end"
+"""The moment after the last step of a plan."""
 
 M = TypeVar("M", bound=BaseModel)
 _NAME = r"^[a-z0-9]+(-[a-z0-9]+)*$"
@@ -88,15 +96,28 @@ class TaskFile(_Model):
     categories: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 
-class ScenarioFile(_Model):
-    """A scenario file: a task with faults."""
-
+class _ScenarioFields(_Model):
     name: str = Field(pattern=_NAME)
-    task: str
     title: str
     kind: str
     cause: str
+    source: str = ""
+    known: str | None = None
+    effect: str | None = None
     faults: list[Fault] = Field(min_length=1)
+
+
+class ScenarioFile(_ScenarioFields):
+    """A scenario file: a task with faults."""
+
+    task: str
+
+
+class ScenarioSetFile(_Model):
+    """Several scenarios of one task; the folder that it lies in names their set."""
+
+    task: str
+    scenarios: list[_ScenarioFields] = Field(min_length=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +130,23 @@ class LoadedTask:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A named set of faults on a task."""
+    """A task with faults.
+
+    Args:
+        name: unique among all sets.
+        task: name of its task.
+        title: in a few words.
+        kind: what sort of failure it is, in RoboFail's terms where it has one.
+        cause: what is wrong, in a sentence; for a harmless one, what is different.
+        faults: what is changed.
+        set: "examples", "robofail", "irreversible" or "harmless"; "own" for a user's file.
+        source: which published episode it rebuilds, empty for one of our own.
+        known: the first step of its plan before which one who looks well and knows the task can
+            know that the run will fail, "end" for after the last one; None for a harmless one.
+        effect: the step that does the harm, "end" where the plan stops too early; None likewise.
+
+    Both are a step in text form; " #2" behind it means its second occurrence.
+    """
 
     name: str
     task: str
@@ -117,6 +154,23 @@ class Scenario:
     kind: str
     cause: str
     faults: tuple[Fault, ...]
+    set: str = "own"
+    source: str = ""
+    known: str | None = None
+    effect: str | None = None
+
+    @property
+    def harmless(self) -> bool:
+        """Whether nothing fails because of it."""
+        return self.set == "harmless"
+
+    def moments(self, plan: Plan) -> tuple[int | None, int | None]:
+        """Where `known` and `effect` are in the plan that the run starts with, from 0.
+
+        Raises:
+            InputError: the plan has no such step.
+        """
+        return _moment(self.known, plan), _moment(self.effect, plan)
 
 
 def schemas() -> dict[str, Any]:
@@ -132,9 +186,15 @@ def task_names() -> tuple[str, ...]:
     return tuple(sorted(name for name, _ in _shipped("tasks")))
 
 
-def scenario_names() -> tuple[str, ...]:
-    """Names of the shipped scenarios."""
-    return tuple(sorted(name for name, _ in _shipped("scenarios")))
+def scenario_names(of: str | None = None) -> tuple[str, ...]:
+    """Names of the shipped scenarios, of one set or of all.
+
+    Raises:
+        UnknownNameError: no such set.
+    """
+    if of is not None and of not in SETS:
+        raise UnknownNameError("set of scenarios", of, SETS)
+    return tuple(n for n, s in _scenarios().items() if of in (None, s.set))
 
 
 def load_task(name_or_file: str) -> LoadedTask:
@@ -156,19 +216,75 @@ def load_scenario(name_or_file: str) -> Scenario:
         UnknownNameError: neither a shipped scenario nor a file.
         FileFormatError: the file is not TOML or has a wrong field.
     """
-    source, text = _read("scenarios", "scenario", name_or_file)
-    data = _validated(ScenarioFile, source, text)
-    return Scenario(data.name, data.task, data.title, data.kind, data.cause, tuple(data.faults))
+    if _is_file(name_or_file):
+        source, text = _read("scenarios", "scenario", name_or_file)
+        data = _validated(ScenarioFile, source, text)
+        return _scenario(data, data.task, "own")
+    shipped = _scenarios()
+    if name_or_file not in shipped:
+        raise UnknownNameError("scenario", name_or_file, shipped)
+    return shipped[name_or_file]
 
 
-def _shipped(folder: str) -> Iterator[tuple[str, str]]:
-    for entry in files("forestall").joinpath("data", folder).iterdir():
+@cache
+def _scenarios() -> Mapping[str, Scenario]:
+    """Every shipped scenario by name, in the order of sets, tasks and files."""
+    found: dict[str, Scenario] = {}
+    for name, text in sorted(_shipped("scenarios")):
+        data = _validated(ScenarioFile, name, text)
+        found[data.name] = _scenario(data, data.task, SETS[0])
+    for set_name in SETS[1:]:
+        for name, text in sorted(_shipped("scenarios", set_name)):
+            several = _validated(ScenarioSetFile, f"{set_name}/{name}", text)
+            for one in several.scenarios:
+                if one.name in found:
+                    raise InputError(f"{set_name}/{name}: there are two scenarios {one.name}")
+                found[one.name] = _scenario(one, several.task, set_name)
+    return found
+
+
+def _scenario(data: _ScenarioFields, task: str, set_name: str) -> Scenario:
+    return Scenario(
+        data.name,
+        task,
+        data.title,
+        data.kind,
+        data.cause,
+        tuple(data.faults),
+        set_name,
+        data.source,
+        data.known,
+        data.effect,
+    )
+
+
+def _moment(text: str | None, plan: Plan) -> int | None:
+    if text is None:
+        return None
+    if text == END:
+        return len(plan)
+    step, _, number = text.partition("#")
+    wanted = str(Subtask.parse(step))
+    places = [i for i, t in enumerate(plan.texts()) if t == wanted]
+    occurrence = int(number) if number.strip().isdigit() else 0 if number else 1
+    if not 1 <= occurrence <= len(places):
+        raise InputError(f"{text!r}: the plan has {wanted} {len(places)} time(s)")
+    return places[occurrence - 1]
+
+
+def _is_file(name_or_file: str) -> bool:
+    return name_or_file.endswith(".toml") or "/" in name_or_file
+
+
+def _shipped(*folders: str) -> Iterator[tuple[str, str]]:
+    place = files("forestall").joinpath("data", *folders)
+    for entry in place.iterdir() if place.is_dir() else ():
         if entry.name.endswith(".toml"):
             yield entry.name.removesuffix(".toml"), entry.read_text(encoding="utf-8")
 
 
 def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str]:
-    if name_or_file.endswith(".toml") or "/" in name_or_file:
+    if _is_file(name_or_file):
         path = Path(name_or_file)
         try:
             return str(path), path.read_text(encoding="utf-8")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from forestall.types.episode import SkillOutcome
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.verdict import Decision
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
@@ -13,6 +13,7 @@ class NoReplanning:
     """Always goes on."""
 
     name = "none"
+    looks_after = LooksAfter.NOTHING
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Go on."""

@@ -13,7 +13,7 @@ from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, R
 from forestall.types.episode import SkillOutcome
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, same_step
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.verdict import (
     Calibration,
     Decision,
@@ -55,6 +55,7 @@ class Proactive:
     """
 
     name = "proactive"
+    looks_after = LooksAfter.NOTHING
 
     def __init__(
         self,

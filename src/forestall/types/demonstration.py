@@ -9,11 +9,26 @@ from forestall.types.plan import Subtask
 
 
 @dataclass(frozen=True, slots=True)
+class View:
+    """What a picture of a boundary comes down to, for detectors that compare pictures.
+
+    `image` is the feature (`types.feature`) of an image encoder over the whole picture, `caption`
+    what a captioner says of it. `encoder` and `captioner` name the two.
+    """
+
+    image: bytes | None = None
+    caption: str = ""
+    encoder: str = ""
+    captioner: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class DemonstrationStep:
     """What was observed just before one subtask of a successful run.
 
     `graph` is scoped to the subtask, `whole` is everything that was known. `image` is the content
-    hash of the stored picture, None when pictures are not kept.
+    hash of the stored picture, None when pictures are not kept. `view` is None where nobody looked
+    at the picture as a whole.
     """
 
     index: int
@@ -21,11 +36,16 @@ class DemonstrationStep:
     graph: SceneGraph
     whole: SceneGraph
     image: str | None = None
+    view: View | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Demonstration:
-    """One successful run. `scene` names the scene (for example "kitchen-17")."""
+    """One successful run.
+
+    `scene` names the scene (for example "kitchen-17"). `final` is everything that was known after
+    the last subtask, None where nobody looked.
+    """
 
     task: str
     scene: str
@@ -34,3 +54,9 @@ class Demonstration:
     perception: tuple[tuple[str, str], ...] = ()
     version: str = ""
     id: str = ""
+    final: SceneGraph | None = None
+
+    def after(self, position: int) -> SceneGraph | None:
+        """Everything that was known after the step at a position."""
+        following = self.steps[position + 1 : position + 2]
+        return following[0].whole if following else self.final

@@ -9,6 +9,7 @@ from typing import Any
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import When
 from forestall.types.task import Task
 from forestall.types.verdict import Diagnosis, Replan, Verdict
 
@@ -57,6 +58,10 @@ class BoundaryRecord:
     why: str = ""  # the strategy's reason, where the verdict does not say it all
     seconds: tuple[tuple[str, float], ...] = ()  # compute by phase
     time_s: float = 0.0  # simulated
+    when: When = (
+        When.BEFORE
+    )  # of the subtask: judged before it, after it, or at the end of the plan
+    watched: tuple[Verdict, ...] = ()  # what further detectors said of the same observation
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,4 +101,5 @@ class EpisodeRecord:
     events: tuple[Event, ...] = ()  # oracle history, filled by the scorer
     simulated_s: float = 0.0
     compute_s: tuple[tuple[str, float], ...] = ()
+    final: SceneGraph | None = None  # everything known after the last subtask, if anybody looked
     provenance: tuple[tuple[str, Any], ...] = field(default=(), hash=False)

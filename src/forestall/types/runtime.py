@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Task
 from forestall.types.verdict import Decision, Diagnosis, Reference, Replan, Verdict
+
+
+class LooksAfter(Enum):
+    """After what a strategy wants the robot to look again where it has just worked."""
+
+    NOTHING = "nothing"
+    SUBTASK = "subtask"
+    EPISODE = "episode"
+
+
+class When(Enum):
+    """At which moment of a run something was judged."""
+
+    BEFORE = "before"  # a subtask
+    AFTER = "after"  # a subtask
+    END = "end"  # the plan is finished
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,3 +76,4 @@ class StrategyAnswer:
     replan: Replan | None = None
     why: str = ""
     seconds: tuple[tuple[str, float], ...] = ()  # compute by phase: retrieve, compare, ...
+    watched: tuple[Verdict, ...] = ()  # what further detectors said of the same observation

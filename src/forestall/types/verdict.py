@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+from forestall.types.demonstration import View
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
@@ -38,6 +39,8 @@ class Reference:
     similarity: float  # of the subtask texts
     graph: SceneGraph
     later: tuple[Subtask, ...] = ()  # what the demonstration did afterwards, this step first
+    view: View | None = None  # the picture as a whole, where it was kept
+    after: SceneGraph | None = None  # everything that was known after the step, if anybody looked
 
 
 @dataclass(frozen=True, slots=True)
