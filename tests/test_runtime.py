@@ -13,19 +13,28 @@ import pytest
 from forestall.benchmark.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.benchmark.files import load_scenario, load_task, scenario_names, task_names
 from forestall.benchmark.goals import TruthGoalChecker
-from forestall.build import RunConfig, make_strategy
+from forestall.build import RunConfig
 from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.envs.kitchen.flat_world import flat_environment
 from forestall.errors import PerceptionError
 from forestall.memory.recording import demonstration_from
+from forestall.parts import make_strategy
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.runtime import Runtime, RuntimeConfig
+from forestall.strategies.none import NoReplanning
 from forestall.types.demonstration import Demonstration
-from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeEnd,
+    EpisodeRecord,
+    SkillOutcome,
+    SkillStatus,
+)
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Observation
-from forestall.types.plan import Subtask
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.verdict import Decision, ReplanOutcome
 from forestall.vocabulary import Vocabulary
 
@@ -85,25 +94,43 @@ def memory() -> list[Demonstration]:
     found = []
     for task in task_names():
         for seed in range(1000, 1004):
-            record = play(RunConfig(task, strategy="none", seed=seed))
+            config = RunConfig(task, strategy="none", seed=seed)
+            record = play(config, limits=RuntimeConfig(final_look=True))
             demonstration = demonstration_from(record, "test")
             assert demonstration is not None, (task, seed, record.failures)
+            assert demonstration.final is not None
+            assert len(demonstration.steps) == len(record.executed)
             found.append(replace(demonstration, id=f"{task}-{seed}"))
     return found
+
+
+def alarms(record: EpisodeRecord) -> list[BoundaryRecord]:
+    """Boundaries with an alarm that the reasoner, or a check, confirmed."""
+    return [
+        b
+        for b in record.boundaries
+        if b.verdict is not None
+        and b.verdict.decision is Decision.REPLAN
+        and b.diagnosis is not None
+        and b.diagnosis.must_change
+    ]
 
 
 @pytest.mark.parametrize("task", task_names())
 def test_undisturbed_runs_succeed_with_and_without_monitor(task: str) -> None:
     plain = play(RunConfig(task, strategy="none", seed=5))
-    watched = play(RunConfig(task, seed=5), memory())
-    assert plain.success and watched.success
+    assert plain.success
     assert plain.end is EpisodeEnd.PLAN_FINISHED
     assert [e.subtask.skill for e in plain.executed] == [s.skill for s in plain.task.plan]
-    assert [
-        str(b.subtask)
-        for b in watched.boundaries
-        if b.verdict is None or b.verdict.decision is not Decision.PROCEED
-    ] == []
+    for strategy in ("proactive", "online", "post-hoc", "watch"):
+        record = play(RunConfig(task, strategy=strategy, seed=5), memory())
+        assert record.success, strategy
+        assert [e.subtask for e in record.executed] == [e.subtask for e in plain.executed]
+        assert [
+            str(b.subtask)
+            for b in record.boundaries
+            if b.verdict is not None and b.verdict.decision is not Decision.PROCEED
+        ] == [], strategy
 
 
 @pytest.mark.parametrize("scenario", ON_FLAT_WORLDS)
@@ -209,3 +236,127 @@ def test_without_a_near_reference_nothing_is_claimed() -> None:
     assert record.success
     assert all(b.verdict is not None and b.verdict.score is None for b in record.boundaries)
     assert all("nothing was judged" in b.verdict.note for b in record.boundaries if b.verdict)
+
+
+class Counting(TruthPerceiver):
+    """Counts the observations that it is given."""
+
+    looks = 0
+
+    def perceive(self, observation: Observation) -> SceneGraph:
+        type(self).looks += 1
+        return super().perceive(observation)
+
+
+@pytest.mark.parametrize(
+    ("strategy", "final_look", "looks"),
+    [
+        ("none", False, 1 + 10),
+        ("none", True, 1 + 10 + 1),
+        ("watch", False, 1 + 10),
+        ("post-hoc", False, 1 + 10 + 1),
+        ("online", False, 1 + 2 * 10 + 1),
+    ],
+)
+def test_only_who_looks_after_pays_for_it(strategy: str, final_look: bool, looks: int) -> None:
+    Counting.looks = 0
+    config = RunConfig("switch-devices", strategy=strategy, seed=5)
+    record = play(config, memory(), RuntimeConfig(final_look=final_look), Counting)
+    assert len(record.initial_plan) == 10
+    assert Counting.looks == looks
+    assert (record.final is not None) == (strategy in ("online", "post-hoc") or final_look)
+
+
+def test_a_moment_after_a_subtask_shares_its_index_and_the_end_has_its_own() -> None:
+    record = play(RunConfig("switch-devices", strategy="online", seed=5), memory())
+    whens = [(b.index, b.when) for b in record.boundaries]
+    both = [(i, when) for i in range(10) for when in (When.BEFORE, When.AFTER)]
+    assert whens == [*both, (10, When.END)]
+    assert record.boundaries[-1].graph == record.final
+    for before, after in zip(record.boundaries[:-1:2], record.boundaries[1::2], strict=True):
+        assert before.subtask == after.subtask
+        assert before.verdict is None and after.verdict is not None
+
+
+def test_why_a_skill_was_refused_is_recorded_and_not_told() -> None:
+    loaded = load_task("heat-potato")
+    kitchen = flat_environment(loaded.task.scene, loaded.vocabulary)
+    told = []
+
+    class Curious(NoReplanning):
+        def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
+            told.append(outcome)
+            return super().after_subtask(context, outcome)
+
+    perceiver = TruthPerceiver(kitchen, loaded.vocabulary)
+    runtime = Runtime(kitchen, perceiver, Curious(), loaded.vocabulary)
+    record = runtime.run(loaded.task, Plan.parse(["pick_up(Microwave)"]), 0)
+    (step,) = record.executed
+    assert step.outcome.status is told[0].status is SkillStatus.REFUSED
+    assert step.outcome.reason
+    assert told[0].reason == ""
+
+
+IRREVERSIBLE = {
+    "bowl-filled-with-wine": "put_in(LettuceSliced-1, Bowl-1)",
+    "pan-dirty": "put_in(EggCracked-1, Pan-1)",
+}
+"""Scenario → the subtask that does the harm."""
+
+
+@pytest.mark.parametrize("scenario", sorted(IRREVERSIBLE))
+def test_what_cannot_be_undone_must_be_seen_before_it_is_done(scenario: str) -> None:
+    task = load_scenario(scenario).task
+    ahead, online, late = (
+        play(RunConfig(task, scenario, strategy, seed=3), memory())
+        for strategy in ("proactive", "online", "post-hoc")
+    )
+    assert ahead.success
+    assert online.success is late.success is False
+    assert any("must never be" in f for f in online.failures)
+    assert alarms(ahead)[0].when is When.BEFORE
+    seen = alarms(online)[0]
+    assert (seen.when, str(seen.subtask)) == (When.AFTER, IRREVERSIBLE[scenario])
+    assert [b.when for b in alarms(late)] == [When.END]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "subtask", "status"),
+    [
+        ("microwave-occupied", "put_in(Plate-1, Microwave-1)", SkillStatus.REFUSED),
+        ("microwave-left-closed", "put_in(Plate-1, Microwave-1)", SkillStatus.REFUSED),
+        ("mug-dropped", "navigate_to_obj(CoffeeMachine-1)", SkillStatus.SUCCEEDED),
+    ],
+)
+def test_what_can_be_undone_is_recovered_later(
+    scenario: str, subtask: str, status: SkillStatus
+) -> None:
+    task = load_scenario(scenario).task
+    ahead, online, late = (
+        play(RunConfig(task, scenario, strategy, seed=3), memory())
+        for strategy in ("proactive", "online", "post-hoc")
+    )
+    assert ahead.success and online.success and late.success
+    seen = alarms(online)[0]
+    assert (seen.when, str(seen.subtask)) == (When.AFTER, subtask)
+    assert next(e for e in online.executed if e.index == seen.index).outcome.status is status
+    (correction,) = alarms(late)
+    assert correction.when is When.END
+    assert correction.diagnosis is not None
+    assert correction.diagnosis.cause.startswith("located at step")
+    assert ahead.simulated_s <= online.simulated_s < late.simulated_s
+
+
+def test_watching_changes_nothing_and_names_what_is_wrong() -> None:
+    plain, watched = (
+        play(RunConfig("heat-potato", "microwave-occupied", strategy, seed=3), memory())
+        for strategy in ("none", "watch")
+    )
+    assert [e.subtask for e in watched.executed] == [e.subtask for e in plain.executed]
+    assert [b.graph for b in watched.boundaries] == [b.graph for b in plain.boundaries]
+    first = alarms(watched)[0]
+    assert first.diagnosis is not None and "Bowl-1" in first.diagnosis.cause
+    names = [[v.detector for v in b.watched] for b in watched.boundaries]
+    assert all(n == names[0] for n in names)
+    assert len(set(names[0])) == len(names[0]) > 1
+    assert all(b.watched[0] == b.verdict for b in watched.boundaries)

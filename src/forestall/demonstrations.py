@@ -20,8 +20,10 @@ from forestall.benchmark.files import load_task
 from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.errors import ForestallError
+from forestall.fingerprint import PRESENTATION
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
+from forestall.parts import make_viewer
 from forestall.types.demonstration import Demonstration
 
 KITCHENS_PER_TASK = 4
@@ -32,7 +34,10 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class RecordingJob:
-    """One demonstration to record: the first succeeding seed of a range of its own."""
+    """One demonstration to record: the first succeeding seed of a range of its own.
+
+    `image_encoder` and `captioner` make the views of its pictures.
+    """
 
     task: str
     first_seed: int
@@ -40,6 +45,8 @@ class RecordingJob:
     states: str = STATES
     renderer: str = "auto"
     feature: str = "parts"
+    image_encoder: str = "two-tower"
+    captioner: str = "listing"
 
 
 def jobs_for(
@@ -48,10 +55,19 @@ def jobs_for(
     seed: int = DEMONSTRATION_SEEDS,
     states: str = STATES,
     feature: str = "parts",
+    image_encoder: str = "two-tower",
+    captioner: str = "listing",
 ) -> list[RecordingJob]:
     """`kitchens` jobs for each task, each with `RecordingJob.tries` seeds of its own."""
     return [
-        RecordingJob(task, seed + 10 * k, states=states, feature=feature)
+        RecordingJob(
+            task,
+            seed + 10 * k,
+            states=states,
+            feature=feature,
+            image_encoder=image_encoder,
+            captioner=captioner,
+        )
         for task in tasks
         for k in range(kitchens)
     ]
@@ -72,10 +88,15 @@ def record_one(job: RecordingJob) -> Demonstration:
             states=job.states,
             renderer=job.renderer,
             feature=job.feature,
-            keep_observations=False,
+            image_encoder=job.image_encoder,
+            captioner=job.captioner,
+            keep_observations=True,
+            final_look=True,
         )
-        record = run_episode(prepare(config), None)
-        demonstration = demonstration_from(record, forestall.__version__)
+        prepared = prepare(config)
+        viewer = make_viewer(config, prepared.loaded.vocabulary)
+        record = run_episode(prepared, None)
+        demonstration = demonstration_from(record, forestall.__version__, view_of=viewer)
         if demonstration is not None:
             return demonstration
         why = record.failures
@@ -125,6 +146,8 @@ def ready_made(
     progress: Progress | None = None,
     workers: int | None = None,
     feature: str = "parts",
+    image_encoder: str = "two-tower",
+    captioner: str = "listing",
 ) -> Path:
     """The path of a task's ready-made memory, made now if it is not in the cache.
 
@@ -140,12 +163,22 @@ def ready_made(
         progress: told (done, total, what).
         workers: processes; all cores by default.
         feature: of nodes; pictures of them are kept where it is "image".
+        image_encoder: of pictures as a whole, for image-level comparison.
+        captioner: of pictures, for caption-based comparison.
     """
     name = load_task(task).task.name
-    path = cache_dir() / "memory" / f"{name}-{_key(task, states, feature)}.db"
+    key = _key(task, states, feature, image_encoder, captioner)
+    path = cache_dir() / "memory" / f"{name}-{key}.db"
     if path.exists():
         return path
-    jobs = jobs_for([task], KITCHENS_PER_TASK, states=states, feature=feature)
+    jobs = jobs_for(
+        [task],
+        KITCHENS_PER_TASK,
+        states=states,
+        feature=feature,
+        image_encoder=image_encoder,
+        captioner=captioner,
+    )
     if announce is not None:
         announce(
             f"first use of {name}: recording {len(jobs)} demonstrations (once; kept in {path})"
@@ -163,16 +196,19 @@ def ready_made(
     return path
 
 
-def _key(task: str, states: str, feature: str) -> str:
+def _key(task: str, states: str, feature: str, image_encoder: str, captioner: str) -> str:
     digest = hashlib.blake2b(digest_size=8)
     parts = [forestall.__version__, states, feature, KITCHENS_PER_TASK, repr(load_task(task))]
-    if states == "clip":
+    parts += [image_encoder, captioner]
+    if "clip" in (states, image_encoder):
         parts.append(os.environ.get("FORESTALL_CLIP"))
+    if captioner == "blip":
+        parts.append(os.environ.get("FORESTALL_BLIP"))
     digest.update(json.dumps(parts).encode())
     root = Path(forestall.__file__).parent
     models = (root / "data" / "encoder").glob("*")
     for path in sorted((*root.rglob("*.py"), *models)):
-        if path.relative_to(root).parts[0] not in ("cli", "report", "training"):
+        if path.relative_to(root).parts[0] not in PRESENTATION:
             digest.update(path.relative_to(root).as_posix().encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()

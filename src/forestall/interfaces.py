@@ -71,8 +71,11 @@ class OracleView(Protocol):
 class Disturbance(Protocol):
     """What a fault may do to a world while it runs (benchmark only)."""
 
-    def drop_held(self) -> str | None:
-        """Let go of the held object where the robot is; its name, None for an empty hand."""
+    def drop_held(self, hard: bool = False) -> str | None:
+        """Let go of the held object where the robot is; its name, None for an empty hand.
+
+        A hard fall breaks what is fragile.
+        """
 
 
 class World(Protocol):

@@ -17,7 +17,20 @@ from forestall.errors import InputError, UnknownNameError
 TABLES: dict[str, dict[str, str]] = {
     "strategy": {
         "none": "forestall.strategies.none:NoReplanning",
+        "online": "forestall.strategies.online:Online",
+        "post-hoc": "forestall.strategies.post_hoc:PostHoc",
         "proactive": "forestall.strategies.proactive:Proactive",
+        "watch": "forestall.strategies.watch:Watch",
+    },
+    "detector": {
+        "caption": "forestall.detection.caption:CaptionDetector",
+        "image": "forestall.detection.image:ImageDetector",
+        "objects": "forestall.detection.objects:ObjectCountDetector",
+        "scene-graph": "forestall.detection.scene_graph:SceneGraphDetector",
+    },
+    "captioner": {
+        "blip": "forestall.embeddings.captioner:BlipCaptioner",
+        "listing": "forestall.embeddings.captions:ListingCaptioner",
     },
     "segmenter": {
         "instance-ids": "forestall.perception.segmenters:InstanceSegmenter",

@@ -1,4 +1,4 @@
-"""The one episode loop: look, perceive, ask the strategy, act.
+"""The one episode loop: look, perceive, ask the strategy, act, and look again where it asks to.
 
 It sees only L0; environment, perceiver, strategy and listeners come through the constructor. All
 strategies run in this loop, so that a measured difference between them is theirs. Listeners are
@@ -26,7 +26,7 @@ from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
 from forestall.types.task import Task
 from forestall.types.verdict import Decision
 
@@ -48,12 +48,15 @@ class RuntimeConfig:
         max_replans: how many corrected plans may be adopted; asking for more ends the run.
         max_looks: how many observations one boundary may take.
         keep_observations: whether pictures go into the record.
+        final_look: whether to look once more when the plan is finished, also for a strategy that
+            does not ask for it (demonstrations record what was known then).
     """
 
     max_subtasks: int = 150
     max_replans: int = 8
     max_looks: int = 2
     keep_observations: bool = True
+    final_look: bool = False
 
 
 @dataclass(slots=True)
@@ -74,6 +77,7 @@ class _Episode:
     boundaries: list[BoundaryRecord] = field(default_factory=list)
     executed: list[ExecutedRecord] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
+    final: SceneGraph | None = None
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
@@ -149,6 +153,7 @@ class Runtime:
             failures=() if broken is None else (f"the run broke off: {broken}",),
             simulated_s=episode.time_s,
             compute_s=tuple(sorted(episode.seconds.items())),
+            final=episode.final,
             provenance=(*provenance, ("perception", dict(self._perceiver.describe()))),
         )
         if score is not None and broken is None:
@@ -175,39 +180,68 @@ class Runtime:
             if episode.index >= len(episode.plan):
                 if context is None:
                     return EpisodeEnd.PLAN_FINISHED
-                answer = self._strategy.after_episode(context)
+                answer = self._finish(episode, context)
                 if not _asks_for_plan(answer):
                     return EpisodeEnd.PLAN_FINISHED
             else:
-                context, answer = self._boundary(episode)
+                context, answer = self._start(episode)
+                if answer.decision is not Decision.STOP and not _asks_for_plan(answer):
+                    answer = self._execute(episode, context)
             if answer.decision is Decision.STOP:
                 return EpisodeEnd.STOPPED
-            if not _asks_for_plan(answer):
-                assert context is not None
-                answer = self._execute(episode, context)
             if _asks_for_plan(answer):
                 if episode.replans >= self._config.max_replans:
                     return EpisodeEnd.REPLAN_LIMIT
                 self._adopt(episode, answer)
         return EpisodeEnd.SUBTASK_LIMIT
 
-    def _boundary(self, episode: _Episode) -> tuple[BoundaryContext, StrategyAnswer]:
-        """Look towards what the next subtask concerns, perceive, and ask the strategy.
-
-        Every look is judged and recorded; the looks of one boundary share its index.
-        """
+    def _start(self, episode: _Episode) -> tuple[BoundaryContext, StrategyAnswer]:
+        """Go to where the next subtask will be done, and judge what is seen there."""
         before = dict(episode.seconds)
         with episode.phase("act"):
             self._approach(episode)
+        subtask = self._ground(episode)
+        found = self._judge(
+            episode, When.BEFORE, episode.index, subtask, self._strategy.before_subtask, before
+        )
+        episode.judged += 1
+        return found
+
+    def _finish(self, episode: _Episode, last: BoundaryContext) -> StrategyAnswer:
+        """The plan is finished: look at the last subtask's place once more, if anybody wants to."""
+        ask = self._strategy.after_episode
+        if not (self._config.final_look or self._strategy.looks_after is not LooksAfter.NOTHING):
+            return ask(last)
+        context, answer = self._judge(episode, When.END, len(episode.plan), last.subtask, ask)
+        episode.judged += 1
+        episode.final = context.graph
+        return answer
+
+    def _judge(
+        self,
+        episode: _Episode,
+        when: When,
+        index: int,
+        subtask: Subtask,
+        ask: Callable[[BoundaryContext], StrategyAnswer],
+        before: dict[str, float] | None = None,
+    ) -> tuple[BoundaryContext, StrategyAnswer]:
+        """Look towards what a subtask concerns, perceive, and ask the strategy.
+
+        Every look is judged and recorded; the looks of one boundary share its index.
+        """
+        before = dict(episode.seconds) if before is None else before
         with episode.phase("observe"):
-            observation = self._look(episode)
+            observation = self._look(episode, subtask)
         for look in range(1, self._config.max_looks + 1):
             with episode.phase("perceive"):
                 episode.graph = self._perceiver.perceive(observation)
                 episode.robot_world_m = observation.robot_position_world_m
-                context = self._context(episode, observation, look)
+                if when is When.BEFORE:
+                    subtask = self._ground(episode)
+                context = self._context(episode, when, index, subtask, observation, look)
             started = time.perf_counter()
-            answer = self._strategy.before_subtask(context)
+            answer = ask(context)
             spent = time.perf_counter() - started
             for name, seconds in answer.seconds:
                 episode.add(name, seconds)
@@ -218,9 +252,8 @@ class Runtime:
                 break
             with episode.phase("observe"):
                 around = self._environment.scan(thorough=True)
-                ahead = self._look(episode)
+                ahead = self._look(episode, subtask)
                 observation = replace(ahead, frames=(*around.frames, *ahead.frames))
-        episode.judged += 1
         return context, answer
 
     def _note(
@@ -233,7 +266,7 @@ class Runtime:
         spent = {k: v - before.get(k, 0.0) for k, v in episode.seconds.items()}
         episode.boundaries.append(
             BoundaryRecord(
-                index=episode.judged,
+                index=episode.judged - (context.when is When.AFTER),
                 subtask=context.subtask,
                 graph=context.graph,
                 scoped=context.scoped,
@@ -245,6 +278,8 @@ class Runtime:
                 why=answer.why,
                 seconds=tuple(sorted((k, v) for k, v in spent.items() if v > 0)),
                 time_s=self._environment.time_s,
+                when=context.when,
+                watched=answer.watched,
             )
         )
         episode.time_s = self._environment.time_s
@@ -266,8 +301,18 @@ class Runtime:
         episode.executed.append(ExecutedRecord(command, outcome, episode.judged - 1))
         for listener in self._listeners:
             listener.on_executed(command, outcome, episode.time_s)
-        episode.index += 1
-        return self._strategy.after_subtask(context, outcome)
+        index, episode.index = episode.index, episode.index + 1
+        outcome = replace(outcome, reason="")  # it may name what the robot has not seen
+        if self._strategy.looks_after is not LooksAfter.SUBTASK:
+            return self._strategy.after_subtask(context, outcome)
+        _, answer = self._judge(
+            episode,
+            When.AFTER,
+            index,
+            context.subtask,
+            lambda seen: self._strategy.after_subtask(seen, outcome),
+        )
+        return answer
 
     def _adopt(self, episode: _Episode, answer: StrategyAnswer) -> None:
         assert answer.replan is not None and answer.replan.plan is not None
@@ -301,9 +346,8 @@ class Runtime:
             return
         self._environment.approach(node.id)
 
-    def _look(self, episode: _Episode) -> Observation:
+    def _look(self, episode: _Episode, subtask: Subtask) -> Observation:
         """Towards where the hand let go last, and the arguments that it does not hold."""
-        subtask = self._ground(episode)
         holding = episode.graph.holding
         points: list[Vec3] = [] if episode.worked_at is None else [episode.worked_at]
         for name in subtask.args:
@@ -312,13 +356,20 @@ class Runtime:
                 points.append(node.centroid_m)
         return self._environment.observe(points)
 
-    def _context(self, episode: _Episode, observation: Observation, look: int) -> BoundaryContext:
-        subtask = self._ground(episode)
-        left = len(episode.plan) - episode.index
+    def _context(
+        self,
+        episode: _Episode,
+        when: When,
+        index: int,
+        subtask: Subtask,
+        observation: Observation,
+        look: int,
+    ) -> BoundaryContext:
+        left = len(episode.plan) - index
         return BoundaryContext(
             task=episode.task,
             plan=episode.plan,
-            index=episode.index,
+            index=index,
             done=max(0, len(episode.start) - left),
             subtask=subtask,
             graph=episode.graph,
@@ -327,6 +378,7 @@ class Runtime:
             looks=look,
             may_look=look < self._config.max_looks,
             replans=episode.replans,
+            when=when,
         )
 
 

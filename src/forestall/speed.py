@@ -15,11 +15,12 @@ from dataclasses import replace
 from typing import Any
 
 from forestall.benchmark.files import load_task
-from forestall.build import STATES, RunConfig, make_state_estimator, prepare, run_episode
+from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.comparison.timing import score_times
 from forestall.demonstrations import ready_made
 from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.memory.store import open_store
+from forestall.parts import make_state_estimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.planning.validate import GraphValidator

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from forestall.benchmark.files import load_task
-from forestall.build import RunConfig, make_detector, make_state_estimator
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.embeddings.hashed import HashedTextEncoder
 from forestall.errors import UnknownNameError
 from forestall.grounding import ground_subtask
 from forestall.memory.retrieval import EmbeddingRetriever
+from forestall.parts import RunConfig, make_detector, make_state_estimator
 from forestall.perception.folder import read_observation
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver

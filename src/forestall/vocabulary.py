@@ -110,6 +110,7 @@ class Device:
         brews: brewing into a dirty or filled vessel spoils it.
         needs_closed: it cannot be turned on while open, nor opened while on.
         needs_held: category that must be held to turn it on.
+        shut_while_on: nothing goes into it while it is on (a toaster whose lever is down).
     """
 
     acts_on: str | None = None
@@ -124,14 +125,15 @@ class Device:
     brews: bool = False
     needs_closed: bool = False
     needs_held: str | None = None
+    shut_while_on: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Category:
     """One category of things.
 
-    `food` marks what can be spoiled by dirt, liquid or company; `slices` is how many slices
-    slicing makes.
+    `food` marks what can be spoiled by dirt, liquid or company; `soaks` food that running water
+    spoils although it is whole (bread); `slices` is how many slices slicing makes.
     """
 
     name: str
@@ -141,6 +143,7 @@ class Category:
     receptacle: Receptacle | None = None
     device: Device | None = None
     food: bool = False
+    soaks: bool = False
     slices: int = 3
     slices_into: str | None = None
     cracks_into: str | None = None
@@ -161,8 +164,8 @@ class Category:
 
     @property
     def washable_food(self) -> bool:
-        """Whether running water does it no harm: whole food, which has its skin or shell."""
-        return self.slices_into is not None or self.cracks_into is not None
+        """Whether running water does it no harm: whole food, unless it soaks."""
+        return not self.soaks and (self.slices_into is not None or self.cracks_into is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,7 +361,7 @@ def _check_names(
     if fields.get("words"):
         check_text(f"category {name}: words", fields["words"])
     texts(f"category {name}: synonyms", fields.get("synonyms", ()))
-    for flag in ("pickupable", "fixture", "food", "drains", "fragile"):
+    for flag in ("pickupable", "fixture", "food", "soaks", "drains", "fragile"):
         if not isinstance(fields.get(flag, False), bool):
             raise InputError(f"category {name}: {flag} must be true or false")
 

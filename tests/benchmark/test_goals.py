@@ -2,7 +2,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from forestall.benchmark.goals import TruthGoalChecker
+from forestall.benchmark.goals import TruthGoalChecker, irreversible
 from forestall.types.episode import Event
 from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
@@ -146,3 +146,58 @@ def test_a_category_that_is_not_there_is_named():
 def test_a_variable_that_only_the_weak_check_uses_does_not_matter_to_the_strict_one():
     goal = _goal("dirty(?m)=clean", weak=["open(?f)=closed"], m="Mug", f="Fridge")
     assert _check(goal, MUGS)[:2] == (True, False)
+
+
+# what cannot be undone
+
+
+def _harm(goal, graph, spoiled=(), events=()):
+    return irreversible(goal, _Oracle(graph, frozenset(spoiled), tuple(events)))
+
+
+def test_nothing_irreversible_has_happened():
+    goal = _goal("filled(?m)=coffee", never=["spoiled(?m)", "broken(Mug)=broken"], m="Mug")
+    assert _harm(goal, MUGS) == ()
+    assert _harm(goal, MUGS, ["Egg-1"], [Event(1.0, "spoiled", ("Egg-1",), "it fell")]) == ()
+
+
+def test_a_variable_means_any_instance_of_its_category():
+    goal = _goal("filled(?m)=coffee", never=["spoiled(?m)"], m="Mug")
+    events = [
+        Event(3.0, "spoiled", ("Egg-1",), "another thing"),
+        Event(5.0, "spoiled", ("Mug-2",), "brewed into dirt"),
+        Event(9.0, "spoiled", ("Mug-1",), "brewed over an egg"),
+    ]
+    gone = ["Mug-1", "Mug-2", "Egg-1"]
+    assert _harm(goal, MUGS, gone, events) == ((5.0, "brewed into dirt"),)
+
+
+def test_harm_comes_in_the_order_of_time_with_its_first_event():
+    goal = _goal(
+        "dirty(?m)=clean",
+        never=["spoiled(Egg)", "broken(Plate)=broken", "inside(?m, Fridge)"],
+        m="Mug",
+    )
+    events = [
+        Event(2.0, "relation", ("Mug-2", "Fridge-1"), "inside(Mug-2, Fridge-1)"),
+        Event(1.0, "state", ("Plate-3",), "broken(Plate-3)=broken"),
+        Event(4.0, "relation", ("Mug-2", "Fridge-1"), "inside(Mug-2, Fridge-1)"),
+        Event(3.0, "spoiled", ("Egg-1",), "Egg-1 broke"),
+    ]
+    assert _harm(goal, MUGS, ["Egg-1"], events) == (
+        (1.0, "broken(Plate-3)=broken"),
+        (2.0, "inside(Mug-2, Fridge-1)"),
+        (3.0, "Egg-1 broke"),
+    )
+
+
+def test_what_was_made_is_so_from_the_moment_when_it_was_made():
+    graph = SceneGraph((_node("AppleSliced-1", sliced="sliced"),))
+    goal = _goal("dirty(Mug)=clean", never=["sliced(AppleSliced)=sliced"])
+    events = [
+        Event(1.0, "relation", ("Apple-1", "CounterTop-1"), "on_top_of(Apple-1, CounterTop-1)"),
+        Event(6.0, "sliced", ("Apple-1", "AppleSliced-1"), "Apple-1 was sliced"),
+    ]
+    assert _harm(goal, graph, (), events) == ((6.0, "Apple-1 was sliced"),)
+    at_the_start = ((0.0, "sliced(AppleSliced)=sliced from the start"),)
+    assert _harm(goal, graph) == at_the_start

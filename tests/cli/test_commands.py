@@ -63,7 +63,10 @@ def test_compare_prints_score_and_difference(
         (["run", "heat-potatoe"], "did you mean heat-potato"),
         (["run", "heat-potato", "--scenario", "mug-droped"], "did you mean mug-dropped"),
         (["run", "heat-potato", "--scenario", "mug-dropped"], "is for the task make-coffee"),
-        (["run", "heat-potato", "--strategy", "psychic"], "known: none, proactive"),
+        (
+            ["run", "heat-potato", "--strategy", "psychic"],
+            "known: none, online, post-hoc, proactive, watch",
+        ),
         (["run", "heat-potato", "--seed", "-1"], "seed -1"),
         (["run", "heat-potato", "--threshold", "2"], "threshold 2"),
         (["run", "heat-potato", "--sed", "1"], "--seed"),

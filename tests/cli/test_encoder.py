@@ -6,16 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forestall.build import (
-    RunConfig,
-    make_image_encoder,
-    make_state_estimator,
-    make_strategy,
-    prepare,
-)
+from forestall.build import RunConfig, prepare
 from forestall.cli.main import call
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.errors import InputError, UnknownNameError
+from forestall.parts import make_image_encoder, make_state_estimator, make_strategy
 from forestall.training import shards
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import ObjectNode, SceneGraph

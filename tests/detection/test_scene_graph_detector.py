@@ -116,3 +116,13 @@ def test_a_reference_that_had_not_found_the_argument_cannot_judge(
 def test_threshold_is_checked() -> None:
     with pytest.raises(InputError, match="between 0 and 1"):
         DetectorConfig(threshold=90)
+
+
+def test_several_can_watch_under_their_own_names(observation: Observation) -> None:
+    scorer = BatchScorer(ScoreConfig(use_edge=False), HashedTextEncoder())
+    other = SceneGraphDetector(scorer, name="scene-graph without edges")
+    seen = graph("Mug-1", "Pot-1", links=(Relation("Pot-1", "blocking", "Mug-1"),))
+    expected = reference(graph("Mug-1", "Pot-1"))
+    names = {d.judge(seen, observation, [expected]).detector for d in (detector(), other)}
+    assert names == {"scene-graph", "scene-graph without edges"}
+    assert SceneGraphDetector.name == "scene-graph"

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import When
 from forestall.types.verdict import (
     Calibration,
     Decision,
@@ -272,3 +274,50 @@ def test_diagnosis_and_repair_save_the_task(name: str) -> None:
         index += 1
     assert repairs >= 1
     assert unmet(tuple(states), GOALS[task]) == ()
+
+
+def diagnose_after(task: str, done: str, where: str) -> Diagnosis:
+    """The diagnosis after a subtask of a nominal plan, compared with what the next step saw."""
+    plan = PLANS[task]
+    index = plan.texts().index(done)
+    runs = demonstrations(task)
+    after = [
+        replace(r, graph=next_step.graph)
+        for r, next_step in zip(runs[index], runs[index + 1], strict=True)
+    ]
+    graph = seen(observed(scene(home_of(task), where), VOCABULARY))
+    moment = replace(context(task, plan, index, graph, after), when=When.AFTER)
+    step = Subtask(moment.subtask.skill, after[0].subtask.args)
+    return REASONER.diagnose(replace(moment, subtask=step), ALARM)
+
+
+@pytest.mark.parametrize(
+    ("task", "done", "where", "fact"),
+    [
+        ("heat-potato", "close_obj(Microwave)", "Microwave-1 is open", "open(Microwave-1)=closed"),
+        ("heat-potato", "open_obj(Microwave)", "", "open(Microwave-1)=open"),
+        ("make-coffee", "toggle_off(Faucet)", "Faucet-1 is on", "toggled(Faucet-1)=off"),
+        ("heat-potato", "pick_up(Plate)", "Potato-1 on Plate-1", "held_by(Plate-1, gripper)"),
+        (
+            "heat-potato",
+            "put_in(Plate, Microwave)",
+            "Microwave-1 is open, Potato-1 on Plate-1, Plate-1 on Floor-1",
+            "inside(Plate-1, Microwave-1)",
+        ),
+        ("make-salad", "put_on(Lettuce, CounterTop)", "Lettuce-1 on Floor-1", "on_top_of"),
+    ],
+)
+def test_after_a_subtask_what_it_brought_about_in_the_demonstrations_is_missed(
+    task: str, done: str, where: str, fact: str
+) -> None:
+    found = diagnose_after(task, done, where)
+    assert any(fact in str(x) for x in found.must_change), found
+
+
+def test_after_putting_something_down_any_counter_will_do() -> None:
+    known = diagnose_after("make-salad", "put_on(Lettuce, CounterTop)", "Lettuce-1 on Floor-1")
+    (wanted,) = (x for x in known.must_change if x.predicate == "on_top_of")
+    other = "CounterTop-2" if wanted.args[1] == "CounterTop-1" else "CounterTop-1"
+    found = diagnose_after("make-salad", "put_on(Lettuce, CounterTop)", f"Lettuce-1 on {other}")
+    assert found.must_change == ()
+    assert "nothing that held after" in found.cause

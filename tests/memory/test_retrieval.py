@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,8 @@ from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError, MemoryFileError
 from forestall.memory.retrieval import EmbeddingRetriever, RetrievalConfig, subtask_words
 from forestall.memory.store import open_store
-from forestall.types.demonstration import Demonstration
+from forestall.types.demonstration import Demonstration, View
+from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
 COFFEE = (
@@ -90,6 +92,23 @@ def test_later_is_the_rest_of_that_run() -> None:
     assert [str(s) for s in first.later] == list(COFFEE[3:])
     assert first.graph is MEMORY[1].steps[3].graph
     assert first.task == "make-coffee"
+
+
+def test_the_picture_and_what_came_after_are_handed_on() -> None:
+    coffee = sample("make-coffee", COFFEE, "c")
+    viewed = replace(coffee.steps[3], view=View(caption="A mug.", captioner="said"))
+    final = SceneGraph(())
+    steps = (*coffee.steps[:3], viewed, coffee.steps[4])
+    memory = [replace(coffee, steps=steps, final=final)]
+    found = EmbeddingRetriever(memory, HashedTextEncoder())
+    first, second = found.retrieve(Subtask.parse("pick_up(Mug-1)"), "make-coffee", 3)
+    assert (first.index, second.index) == (3, 1)
+    assert first.view is viewed.view and second.view is None
+    assert first.after is coffee.steps[4].whole
+    last = found.retrieve(Subtask.parse("put_in(Mug-1, CoffeeMachine-1)"), "make-coffee", 4)[0]
+    assert last.after is final
+    unwatched = EmbeddingRetriever([coffee], HashedTextEncoder())
+    assert unwatched.retrieve(coffee.steps[4].subtask, "make-coffee", 4)[0].after is None
 
 
 def test_numbers_are_stripped() -> None:

@@ -17,7 +17,7 @@ from demonstration_samples import demonstration, with_id
 from forestall.errors import InputError, MemoryFileError
 from forestall.memory.codec import DamageError, decode, encode
 from forestall.memory.store import SCHEMA_VERSION, SqliteStore, open_store
-from forestall.types.demonstration import Demonstration
+from forestall.types.demonstration import Demonstration, View
 from forestall.types.facts import GRIPPER
 from forestall.types.feature import quantised
 from forestall.types.graph import SceneGraph
@@ -77,14 +77,67 @@ def test_image_features_come_back(path: Path) -> None:
     assert node is not None and node.feature is not None
 
 
-def test_without_features_nothing_is_written_of_them() -> None:
+def test_of_what_is_not_there_nothing_is_written() -> None:
     """So that what was stored before there were any is read and hashed as before."""
     things = json.loads(zlib.decompress(encode(ONE).things))
     assert things["format"] == 1
+    assert things.keys() == {"format", "nodes", "relations"}
     keys = {key for node in things["nodes"] for key in node}
     assert keys == {
         *("box_m", "category", "centroid_m", "id", "last_seen_s", "pixels", "seen", "states")
     }
+
+
+def with_views(sample: Demonstration) -> Demonstration:
+    """The second step with a picture and a caption, the third with a caption, and a last look."""
+    first, second, third = sample.steps
+    picture = View(quantised([1, -3, 2]), "A clean mug.", "two-tower", "listing (stand-in)")
+    steps = (first, replace(second, view=picture), replace(third, view=View(caption="Ein Becher")))
+    seen = replace(third.whole, relations=(), subtask=None)
+    return replace(sample, steps=steps, final=seen)
+
+
+def test_views_and_the_last_look_come_back(path: Path) -> None:
+    viewed = with_views(ONE)
+    with open_store(path, create=True) as store:
+        names = [store.add(viewed), store.add(replace(viewed, final=None)), store.add(TWO)]
+        assert len(set(names)) == 3
+    with open_store(path) as store:
+        found = {d.id: replace(d, id="") for d in store.all()}
+    assert found[names[0]] == viewed
+    assert found[names[1]] == replace(viewed, final=None)
+    assert found[names[0]].after(1) == viewed.steps[2].whole
+    assert found[names[0]].after(2) == viewed.final
+    assert found[names[1]].after(2) is None
+
+
+@pytest.mark.parametrize(
+    "views",
+    [
+        [None],
+        [None, None, {"image": None, "caption": 3, "encoder": "", "captioner": ""}],
+        [None, None, {"image": "no base64!", "caption": "", "encoder": "e", "captioner": ""}],
+        [None, None, {"image": "AAAA", "caption": "", "encoder": "e", "captioner": ""}],
+        [None, None, {"image": None}],
+        [None, None, "a view"],
+    ],
+)
+def test_damaged_views(views: object) -> None:
+    things_damaged("views", views)
+
+
+@pytest.mark.parametrize("final", [{}, "a graph", {"nodes": [3, 1], "relations": [], "hidden": []}])
+def test_a_damaged_last_look(final: object) -> None:
+    things_damaged("final", final)
+
+
+def things_damaged(key: str, content: object) -> None:
+    encoded = encode(with_views(ONE))
+    things = json.loads(zlib.decompress(encoded.things))
+    things[key] = content
+    bad = replace(encoded, things=zlib.compress(json.dumps(things).encode()))
+    with pytest.raises(DamageError):
+        decode(bad, "x", bad.digest)
 
 
 @pytest.mark.parametrize("feature", ["no base64!", "", "AAAA", 5])

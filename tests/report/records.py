@@ -19,7 +19,7 @@ from forestall.types.facts import Literal
 from forestall.types.graph import Relation, SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
 from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import (
@@ -323,6 +323,31 @@ def troubled_record() -> EpisodeRecord:
     )
 
 
+def looked_after_record() -> EpisodeRecord:
+    """A strategy that judges after subtasks: the refused one is repaired, the end is looked at."""
+    whole = potato_record()
+    rest = solved().plan
+    assert rest is not None
+    refused = SkillOutcome(SkillStatus.REFUSED, 1.0, "Microwave-1 has no room for Plate-1")
+    fine = SkillOutcome(SkillStatus.SUCCEEDED, 4.0)
+    done = (*Plan.parse(NOMINAL).subtasks[:9], *rest.subtasks)
+    boundaries, executed = [], []
+    for i, s in enumerate(done):
+        before = replace(boundary(i, s), verdict=None)
+        after = replace(boundary(i, s, alarm=i == 8), when=When.AFTER)
+        boundaries += [before, after]
+        executed.append(ExecutedRecord(s, refused if i == 8 else fine, i))
+    watching = (verdict(done[-1], 15, False), replace(verdict(done[-1], 15, True), detector="b"))
+    end = replace(boundary(len(done), done[-1]), when=When.END, watched=watching)
+    return replace(
+        whole,
+        strategy="online",
+        boundaries=(*boundaries, end),
+        executed=tuple(executed),
+        final=end.graph,
+    )
+
+
 def empty_record() -> EpisodeRecord:
     """A run that ended before its first boundary."""
     return EpisodeRecord(
@@ -335,6 +360,7 @@ def calls(record: EpisodeRecord) -> list[tuple[BoundaryContext, StrategyAnswer]]
     found = []
     plan, index = record.initial_plan, 0
     for b in record.boundaries:
+        index -= b.when is When.AFTER
         assert b.observation is not None
         context = BoundaryContext(
             task=record.task,
@@ -346,13 +372,21 @@ def calls(record: EpisodeRecord) -> list[tuple[BoundaryContext, StrategyAnswer]]
             scoped=b.scoped,
             observation=b.observation,
             looks=b.looks,
+            when=b.when,
         )
         solved_it = b.replan is not None and b.replan.outcome is ReplanOutcome.SOLVED
         decision = Decision.REPLAN if solved_it else Decision.PROCEED
         found.append(
             (
                 context,
-                StrategyAnswer(decision, b.verdict, b.diagnosis, b.replan, seconds=b.seconds),
+                StrategyAnswer(
+                    decision,
+                    b.verdict,
+                    b.diagnosis,
+                    b.replan,
+                    seconds=b.seconds,
+                    watched=b.watched,
+                ),
             )
         )
         index += 1

@@ -5,12 +5,14 @@ from dataclasses import replace
 from forestall.report.derived import (
     Mark,
     RowKind,
+    done_before,
     moments,
     plan_rows,
     provenance_of,
 )
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask, same_step
+from forestall.types.runtime import When
 from forestall.types.verdict import Decision
 
 from . import records
@@ -48,6 +50,30 @@ def test_every_mark_has_its_occasion() -> None:
         (moment, *_) = moments(replace(record, boundaries=(changed,)))
         assert moment.mark is mark
     assert moments(records.empty_record()) == ()
+
+
+def test_moments_after_a_subtask_are_their_own() -> None:
+    found = moments(records.looked_after_record())
+    assert [m.when for m in found] == [When.BEFORE, When.AFTER] * 15 + [When.END]
+    assert all((m.executed is not None) == (m.when is When.BEFORE) for m in found)
+    start, over = found[16:18]
+    assert (start.mark, over.mark) == (Mark.REFUSED, Mark.REPLANNED)
+    assert len(start.before) == len(over.before) + 1 == 3
+    assert over.boundary is not None
+    assert len(done_before(records.looked_after_record(), over.boundary)) == 9
+    assert found[18].before == over.after
+    assert found[-1].before == ()
+
+
+def test_an_alarm_that_was_only_watched_is_unsolved_if_something_must_change() -> None:
+    record = records.potato_record()
+    watched = replace(record.boundaries[records.ALARM_INDEX], replan=None)
+    (moment, *_) = moments(replace(record, boundaries=(watched,), executed=()))
+    assert moment.mark is Mark.UNSOLVED
+    assert watched.diagnosis is not None
+    harmless = replace(watched, diagnosis=replace(watched.diagnosis, must_change=()))
+    (moment, *_) = moments(replace(record, boundaries=(harmless,), executed=()))
+    assert moment.mark is Mark.DISMISSED
 
 
 def test_plan_rows_tell_done_kept_removed_and_inserted() -> None:

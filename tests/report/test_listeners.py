@@ -8,7 +8,7 @@ from rich.console import Console
 from forestall.interfaces import Listener
 from forestall.report.listeners import ProgressLine
 from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
-from forestall.types.runtime import StrategyAnswer
+from forestall.types.runtime import StrategyAnswer, When
 from forestall.types.verdict import Decision
 
 from . import records
@@ -30,7 +30,7 @@ def follow(listener: Listener, record: EpisodeRecord) -> None:
     executed = {e.index: e for e in record.executed}
     for context, answer in records.calls(record):
         listener.on_boundary(context, answer)
-        if context.done in executed:
+        if context.when is When.BEFORE and context.done in executed:
             step = executed[context.done]
             listener.on_executed(step.subtask, step.outcome, 4.0 * step.index + 4)
     listener.on_end(record)
@@ -107,3 +107,11 @@ def test_it_writes_to_standard_error(capfd: pytest.CaptureFixture[str]) -> None:
     out, err = capfd.readouterr()
     assert out == ""
     assert "heat-potato succeeded" in err
+
+
+def test_alarms_after_a_subtask_are_said_so() -> None:
+    lines = written(records.looked_after_record()).splitlines()
+    alarm = lines.index(f"alarm after put_in(Plate, Microwave): {records.CAUSE}")
+    assert "put_in(Plate, Microwave) refused" in lines[alarm - 1]
+    assert lines[alarm + 1] == "new plan: 6 subtasks"
+    assert lines[alarm + 2].startswith("10/15 ")

@@ -18,6 +18,7 @@ MAKERS = [
     records.potato_record,
     records.unjudged_record,
     records.troubled_record,
+    records.looked_after_record,
     records.empty_record,
 ]
 
@@ -229,3 +230,17 @@ def test_the_file_is_written_whole(tmp_path: Path) -> None:
 )
 def test_durations_are_short(seconds: float, words: str) -> None:
     assert duration(seconds) == words
+
+
+def test_moments_after_a_subtask_and_at_the_end_are_said_so() -> None:
+    found = page(records.looked_after_record())
+    assert "Before and after each subtask, and at the end" in found.text
+    assert "after put_in(Plate, Microwave)" in found.text
+    assert "The subtask was over: a new plan follows." in found.text
+    assert "The plan was finished." in found.text
+    assert "Not judged: the strategy does not compare scenes before a subtask." in found.text
+    assert "What each detector said" in found.text
+    assert "done: put_in(Plate, Microwave)" in found.text
+    assert "next: put_in(Plate, Microwave)" in found.text
+    assert "0.734 of 0.900: replan" in found.text
+    assert "Before each subtask" in page(records.potato_record()).text

@@ -19,6 +19,7 @@ from forestall.report.record import (
 )
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.graph import SceneGraph
+from forestall.types.runtime import When
 from forestall.types.verdict import Replan, ReplanOutcome
 
 from . import records
@@ -70,6 +71,7 @@ def test_the_alarm_says_what_where_and_why() -> None:
         {
             "position": records.ALARM_INDEX,
             "index": records.ALARM_INDEX,
+            "when": "before",
             "subtask": "pick_up(Plate-1)",
             "score": 0.734,
             "threshold": 0.9,
@@ -208,7 +210,7 @@ def run_until(recorder: Listener, record: EpisodeRecord, boundaries: int) -> Non
     executed = {e.index: e for e in record.executed}
     for context, answer in records.calls(record)[:boundaries]:
         recorder.on_boundary(context, answer)
-        if context.done in executed:
+        if context.when is When.BEFORE and context.done in executed:
             step = executed[context.done]
             recorder.on_executed(step.subtask, step.outcome, 4.0 * step.index + 4)
 
@@ -315,3 +317,28 @@ def test_a_failed_write_leaves_the_old_record(
         write_record(tmp_path, records.empty_record(), page="other")
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == [RECORD_NAME]
+
+
+def test_moments_after_and_at_the_end_are_told_apart(tmp_path: Path) -> None:
+    record = records.looked_after_record()
+    data = record_json(record, page=None, images={})
+    assert [b["when"] for b in data["boundaries"]] == ["before", "after"] * 15 + ["end"]
+    (alarm,) = data["alarms"]
+    assert (alarm["when"], alarm["index"], alarm["position"]) == ("after", 8, 17)
+    assert alarm["replanned"] is True
+    assert data["replans"] == 1
+    assert data["final"] == data["boundaries"][-1]["graph"]
+    assert [(w["detector"], w["score"]) for w in data["boundaries"][-1]["watched"]] == [
+        ("scene_graph", 0.962),
+        ("b", 0.734),
+    ]
+    after = data["boundaries"][17]
+    assert after["plan_before"] == list(records.NOMINAL[9:])
+    assert data["boundaries"][18]["plan_before"][0] == records.INSERTED[0]
+    recorder = RunRecorder(tmp_path)
+    run_until(recorder, record, 99)
+    killed = read_record(tmp_path)
+    for key in ("when", "index", "subtask", "plan_before", "plan_after", "watched"):
+        assert [b[key] for b in killed["boundaries"]] == [b[key] for b in data["boundaries"]], key
+    assert [e["index"] for e in killed["executed"]] == [e["index"] for e in data["executed"]]
+    assert killed["final"] is None

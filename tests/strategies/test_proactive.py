@@ -2,65 +2,12 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
+from scripted import OPEN, REPAIRED, Parts, boundary
 
 from forestall.strategies.proactive import Proactive
-from forestall.types.facts import Literal
-from forestall.types.graph import SceneGraph
-from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
-from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext
-from forestall.types.scene import SceneNeeds
-from forestall.types.task import Goal, Task
-from forestall.types.verdict import (
-    Calibration,
-    Decision,
-    Diagnosis,
-    PlanCheck,
-    Replan,
-    ReplanOutcome,
-    Verdict,
-)
-
-PLAN = Plan.parse(["pick_up(Plate)", "put_in(Plate, Microwave)", "close_obj(Microwave)"])
-OPEN = Literal.parse("open(Microwave-1)=open")
-REPAIRED = Plan((Subtask.parse("open_obj(Microwave-1)"), *PLAN.subtasks[1:]))
-
-
-class Parts:
-    """All collaborators in one scripted double that counts its calls."""
-
-    name = "scripted"
-
-    def __init__(
-        self,
-        decision: Decision,
-        must_change: tuple[Literal, ...] = (),
-        replan: Replan | None = None,
-        rest_runs: bool = True,
-    ) -> None:
-        self.decision = decision
-        self.must_change = must_change
-        self.answer = replan or Replan(ReplanOutcome.SOLVED, REPAIRED)
-        self.rest_runs = rest_runs
-        self.replanned = 0
-
-    def retrieve(self, subtask, task, done):  # type: ignore[no-untyped-def]
-        return []
-
-    def judge(self, observed, observation, references):  # type: ignore[no-untyped-def]
-        return Verdict(self.decision, "scripted", 0.5, 0.9, Calibration.FIXED)
-
-    def diagnose(self, context, verdict):  # type: ignore[no-untyped-def]
-        return Diagnosis("the microwave is closed", self.must_change)
-
-    def replan(self, context, diagnosis):  # type: ignore[no-untyped-def]
-        self.replanned += 1
-        return self.answer
-
-    def check(self, plan, graph, goal):  # type: ignore[no-untyped-def]
-        return PlanCheck(self.rest_runs, reason="the microwave is closed")
+from forestall.types.verdict import Decision, Replan, ReplanOutcome
 
 
 def strategy(parts: Parts) -> Proactive:
@@ -69,22 +16,7 @@ def strategy(parts: Parts) -> Proactive:
 
 @pytest.fixture
 def context() -> BoundaryContext:
-    frame = Frame(
-        np.zeros((2, 2, 3), np.uint8),
-        np.ones((2, 2), np.float32),
-        Intrinsics.from_vertical_fov(2, 2, 60.0),
-        np.eye(4),
-    )
-    return BoundaryContext(
-        task=Task("heat", "Heat", Goal("hot"), PLAN, SceneNeeds()),
-        plan=PLAN,
-        index=1,
-        done=1,
-        subtask=PLAN.subtasks[1],
-        graph=SceneGraph(()),
-        scoped=SceneGraph(()),
-        observation=Observation((frame,), GripperState(None, (0.0, 0.0, 0.0)), 0.0),
-    )
+    return boundary()
 
 
 def test_a_scene_that_fits_goes_on_without_diagnosis(context: BoundaryContext) -> None:

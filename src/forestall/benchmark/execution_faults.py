@@ -1,6 +1,10 @@
 """An environment whose skills go wrong now and then, as a scenario says.
 
 Wraps any `Environment` and is one itself. Built by `faults.wrap`; calls point inwards.
+
+A robot that has picked up the wrong thing goes on taking it for the right one: what is done with
+the one is done with the other, until a subtask names the wrong thing, which shows that the mistake
+was noticed, or the right one is picked up.
 """
 
 from __future__ import annotations
@@ -52,11 +56,13 @@ class FaultyEnvironment:
         self._vocabulary = vocabulary
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
+        self._mistaken: set[int] = set()
 
     def reset(self, seed: int) -> None:
         """Reset the world and arm every fault again."""
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
+        self._mistaken = set()
         self._inner.reset(seed)
 
     def scan(self, thorough: bool = False) -> Observation:
@@ -73,8 +79,9 @@ class FaultyEnvironment:
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run a skill, with every fault that is due."""
+        self._notice(subtask)
         due = self._due(subtask)
-        command, silent = subtask, False
+        command, silent = self._mixed_up(subtask), False
         for index in due:
             fault = self._faults[index]
             if fault.kind == "failed_action":
@@ -90,12 +97,39 @@ class FaultyEnvironment:
         outcome = self._pretend(command) if silent else self._inner.execute(command)
         if not lets_go:
             self._drop(due)
+        if subtask.skill == "pick_up" and outcome.status is SkillStatus.SUCCEEDED:
+            self._mistaken -= {i for i in self._mistaken if self._is_right(i, subtask.args[0])}
+            self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
         return outcome
+
+    def _notice(self, subtask: Subtask) -> None:
+        """A mistake ends for good when a subtask names the wrong thing."""
+        for index in sorted(self._mistaken):
+            by = _acts_on(self._faults[index])
+            if any(self._same(by, a) for a in subtask.args):
+                self._mistaken.discard(index)
+                self._done[index] = self._faults[index].times
+
+    def _mixed_up(self, subtask: Subtask) -> Subtask:
+        """The subtask with what is taken for something else; picking up looks anew."""
+        args = subtask.args
+        for index in sorted(self._mistaken) if subtask.skill != "pick_up" else ():
+            by = _acts_on(self._faults[index])
+            args = tuple(by if self._is_right(index, a) else a for a in args)
+        return Subtask(subtask.skill, args)
+
+    def _is_right(self, index: int, name: str) -> bool:
+        """Whether a name means the thing that a fault mistakes something for."""
+        return self._same(Subtask.parse(self._faults[index].step).args[0], name)
 
     def _drop(self, due: Sequence[int]) -> None:
         """Lose what is held: on the way for a placing subtask, else after it."""
         for index in due:
-            if self._faults[index].kind == "drop" and self._disturbance.drop_held() is not None:
+            fault = self._faults[index]
+            if fault.kind != "drop":
+                continue
+            hard = bool(getattr(fault, "hard", False))
+            if self._disturbance.drop_held(hard) is not None:
                 self._done[index] += 1
 
     @property
@@ -131,7 +165,7 @@ class FaultyEnvironment:
         return a == (b if category is None else category.name)
 
     def _misled(self, subtask: Subtask, fault: Activation) -> Subtask:
-        by = str(getattr(fault, "acts_on", ""))
+        by = _acts_on(fault)
         position = -1 if fault.kind == "wrong_receptacle" else 0
         args = list(subtask.args)
         args[position] = by
@@ -143,3 +177,8 @@ class FaultyEnvironment:
         if subtask.skill != "navigate_to_obj":
             self._inner.execute(Subtask("navigate_to_obj", subtask.args[-1:]))
         return SkillOutcome(SkillStatus.SUCCEEDED, self._inner.time_s - before)
+
+
+def _acts_on(fault: Activation) -> str:
+    """What a misled subtask acts on instead."""
+    return str(getattr(fault, "acts_on", ""))

@@ -1,9 +1,9 @@
 """Faults: small, composable changes of a scene, of a plan, or of how skills are carried out.
 
 Scenario files hold them as tables that `kind` tells apart; `Fault` is the type to embed in a file
-schema. Scene faults edit `SceneNeeds` and plan faults edit a `Plan` before a run; execution faults
-wrap the environment. Each execution fault applies `times` times, once by default, so that a
-corrected plan can succeed.
+schema. Scene faults (`scene_faults`) edit `SceneNeeds` and plan faults edit a `Plan` before a run;
+execution faults wrap the environment. Each execution fault applies `times` times, once by default,
+so that a corrected plan can succeed.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     TypeAdapter,
     ValidationError,
@@ -23,11 +21,11 @@ from pydantic import (
 )
 
 from forestall.benchmark.execution_faults import FaultyEnvironment
+from forestall.benchmark.scene_faults import FaultTable, SceneFault
+from forestall.benchmark.scene_faults import apply_scene_faults as apply_scene_faults  # noqa: PLC0414
 from forestall.errors import InputError, UnknownNameError
 from forestall.interfaces import Disturbance, Environment
-from forestall.types.facts import category_of, is_instance
 from forestall.types.plan import SKILLS, Plan, Subtask, same_step
-from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.vocabulary import Vocabulary, household
 
 
@@ -46,46 +44,7 @@ Step = Annotated[
 Occurrence = Annotated[int, Field(ge=1, description="which of several equal ones, from 1")]
 
 
-class _Fault(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class AddObject(_Fault):
-    """A further object; `in_front_of` makes it block another one."""
-
-    kind: Literal["add_object"] = "add_object"
-    category: str
-    id: str | None = None
-    places: tuple[str, ...] = ()
-    states: dict[str, str] = Field(default_factory=dict)
-    in_front_of: str | None = None
-
-
-class SetState(_Fault):
-    """Another start state of an object that the task asks for, or of a fixture."""
-
-    kind: Literal["set_state"] = "set_state"
-    object: str
-    attribute: str
-    value: str
-
-
-class MoveObject(_Fault):
-    """An object that the task asks for starts somewhere else."""
-
-    kind: Literal["move_object"] = "move_object"
-    object: str
-    places: tuple[str, ...] = Field(min_length=1)
-
-
-class RemoveObject(_Fault):
-    """An object that the task asks for is missing."""
-
-    kind: Literal["remove_object"] = "remove_object"
-    object: str
-
-
-class DropStep(_Fault):
+class DropStep(FaultTable):
     """The plan forgets a step."""
 
     kind: Literal["drop_step"] = "drop_step"
@@ -93,7 +52,7 @@ class DropStep(_Fault):
     occurrence: Occurrence = 1
 
 
-class _Anchored(_Fault):
+class _Anchored(FaultTable):
     before: Step | None = None
     after: Step | None = None
     occurrence: Occurrence = 1
@@ -119,7 +78,7 @@ class MoveStep(_Anchored):
     step: Step
 
 
-class ReplaceArgument(_Fault):
+class ReplaceArgument(FaultTable):
     """The plan names another thing; `argument` is the role, object or target."""
 
     kind: Literal["replace_argument"] = "replace_argument"
@@ -129,14 +88,14 @@ class ReplaceArgument(_Fault):
     by: str
 
 
-class ReplacePlan(_Fault):
+class ReplacePlan(FaultTable):
     """Another plan altogether."""
 
     kind: Literal["replace_plan"] = "replace_plan"
     plan: tuple[Step, ...] = Field(min_length=1)
 
 
-class _Execution(_Fault):
+class _Execution(FaultTable):
     step: Step
     occurrence: Occurrence = 1
     times: Annotated[int, Field(ge=1, description="how many times it happens at most")] = 1
@@ -146,6 +105,7 @@ class Drop(_Execution):
     """The held object slips out of the gripper while the step is carried out."""
 
     kind: Literal["drop"] = "drop"
+    hard: bool = Field(default=False, description="so hard that what is fragile breaks")
 
 
 class FailedAction(_Execution):
@@ -176,7 +136,6 @@ class WrongReceptacle(_Execution):
         return self
 
 
-SceneFault = AddObject | SetState | MoveObject | RemoveObject
 PlanFault = DropStep | InsertStep | MoveStep | ReplaceArgument | ReplacePlan
 ExecutionFault = Drop | FailedAction | WrongObject | WrongReceptacle
 Fault = Annotated[SceneFault | PlanFault | ExecutionFault, Field(discriminator="kind")]
@@ -200,31 +159,17 @@ def parse_fault(table: Mapping[str, Any]) -> Any:
         raise InputError(f"fault: {problems}") from error
 
 
-def apply_scene_faults(
-    needs: SceneNeeds, faults: Iterable[Any], vocabulary: Vocabulary
-) -> SceneNeeds:
-    """The scene with its scene faults; other faults are left for their own functions.
+def knowable(faults: Iterable[Any]) -> str:
+    """Through what a failure can be known: "scene", "plan" or "after" something went wrong.
 
-    Raises:
-        InputError: a fault names an object, place, attribute or value that is not there.
+    Where faults of several sorts meet, the one that shows last decides.
     """
-    for fault in faults:
-        if isinstance(fault, AddObject):
-            needs = _add(needs, fault, vocabulary)
-        elif isinstance(fault, SetState):
-            needs = _set(needs, fault, vocabulary)
-        elif isinstance(fault, MoveObject):
-            chosen = _chosen(needs, fault.object, "move_object.object", vocabulary)
-            places = _places(fault.places, "move_object.places", vocabulary)
-            objects = (
-                replace(o, places=places, in_front_of=None) if o in chosen else o
-                for o in needs.objects
-            )
-            needs = replace(needs, objects=tuple(objects))
-        elif isinstance(fault, RemoveObject):
-            chosen = _chosen(needs, fault.object, "remove_object.object", vocabulary)
-            needs = replace(needs, objects=tuple(o for o in needs.objects if o not in chosen))
-    return needs
+    kinds = {type(f) for f in faults}
+    if kinds & {Drop, FailedAction, WrongObject, WrongReceptacle}:
+        return "after"
+    if kinds & {DropStep, InsertStep, MoveStep, ReplaceArgument, ReplacePlan}:
+        return "plan"
+    return "scene"
 
 
 def apply_plan_faults(plan: Plan, faults: Iterable[Any]) -> Plan:
@@ -293,83 +238,6 @@ def wrap(
     if not chosen:
         return environment
     return FaultyEnvironment(environment, chosen, disturbance, vocabulary or household())
-
-
-def _add(needs: SceneNeeds, fault: AddObject, vocabulary: Vocabulary) -> SceneNeeds:
-    category = vocabulary[fault.category]
-    if category.fixture:
-        raise InputError(
-            f"add_object.category: {category.name} is a fixture; fixtures belong to the room"
-        )
-    taken = {o.id for o in needs.objects}
-    number = 1
-    while fault.id is None and f"{category.name}-{number}" in taken:
-        number += 1
-    name = fault.id or f"{category.name}-{number}"
-    if name in taken:
-        raise InputError(f"add_object.id: {name} is already in the scene")
-    if category_of(name) != category.name or not is_instance(name):
-        raise InputError(f"add_object.id: {name!r} must read {category.name}-<number>")
-    for attribute, value in fault.states.items():
-        _check_state(category.name, attribute, value, "add_object.states", vocabulary)
-    front = fault.in_front_of
-    if front is not None:
-        front = _chosen(needs, front, "add_object.in_front_of", vocabulary)[0].id
-    places = _places(fault.places, "add_object.places", vocabulary)
-    for place in places:
-        if not vocabulary.accepts(place, category.name):
-            raise InputError(f"add_object.places: {place} does not take {category.name}")
-    need = ObjectNeed(name, category.name, places, tuple(sorted(fault.states.items())), front)
-    return replace(needs, objects=(*needs.objects, need))
-
-
-def _set(needs: SceneNeeds, fault: SetState, vocabulary: Vocabulary) -> SceneNeeds:
-    name = vocabulary.canonical(fault.object)
-    category = vocabulary[name]
-    _check_state(category.name, fault.attribute, fault.value, "set_state", vocabulary)
-    if category.fixture:
-        instance = name if is_instance(name) else f"{name}-1"
-        kept = tuple(f for f in needs.fixtures if f[:2] != (instance, fault.attribute))
-        return replace(needs, fixtures=(*kept, (instance, fault.attribute, fault.value)))
-    chosen = _chosen(needs, name, "set_state.object", vocabulary)
-    objects = (
-        replace(o, states=tuple(sorted((dict(o.states) | {fault.attribute: fault.value}).items())))
-        if o in chosen
-        else o
-        for o in needs.objects
-    )
-    return replace(needs, objects=tuple(objects))
-
-
-def _check_state(
-    category: str, attribute: str, value: str, field: str, vocabulary: Vocabulary
-) -> None:
-    known = vocabulary[category].attributes
-    if attribute not in known:
-        raise UnknownNameError(f"attribute of {category} ({field})", attribute, known)
-    values = vocabulary.values(attribute)
-    if value not in values:
-        raise UnknownNameError(f"value of {attribute} ({field})", value, values)
-
-
-def _places(places: Sequence[str], field: str, vocabulary: Vocabulary) -> tuple[str, ...]:
-    names = tuple(vocabulary.canonical(p) for p in places)
-    for name in names:
-        if vocabulary[name].receptacle is None:
-            raise InputError(f"{field}: nothing can be put on or into {name}")
-    return names
-
-
-def _chosen(
-    needs: SceneNeeds, name: str, field: str, vocabulary: Vocabulary
-) -> tuple[ObjectNeed, ...]:
-    """The needs that an instance or category name means."""
-    wanted = vocabulary.canonical(name)
-    found = tuple(o for o in needs.objects if wanted in (o.id, o.category))
-    if not found:
-        known = {n for o in needs.objects for n in (o.id, o.category)}
-        raise UnknownNameError(f"object of the task ({field})", name, known)
-    return found
 
 
 def _find(steps: Sequence[Subtask], text: str, occurrence: int, field: str) -> int:

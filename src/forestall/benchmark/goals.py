@@ -19,6 +19,9 @@ from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.task import Goal
 
+MADE = ("sliced", "cracked", "broken")
+"""Kinds of events by which the first of their objects became the others."""
+
 
 @dataclass(frozen=True, slots=True)
 class _History:
@@ -43,13 +46,26 @@ class _History:
 
     def happened(self, literal: Literal) -> bool:
         """Whether a literal is true in the end or became true at any time."""
-        return self.holds(literal) or any(
-            f.predicate == literal.predicate
-            and f.value == literal.value
-            and len(f.args) == len(literal.args)
-            and all(_means(a, b) for a, b in zip(literal.args, f.args, strict=True))
-            for f in self.facts
-        )
+        return self.holds(literal) or any(_covers(literal, f) for f in self.facts)
+
+    def first(self, literal: Literal) -> tuple[float, str]:
+        """When something first happened, and in which words; at 0 s if it was so at the start."""
+        for event in self.events:
+            fact = _fact(event)
+            if literal.predicate == "spoiled":
+                told = event.kind == "spoiled" and _means(literal.args[0], event.objects[0])
+            elif fact is not None:
+                told = _covers(literal, fact)
+            else:  # what was made is what it is from then on
+                made = event.objects[1:] if event.kind in MADE else ()
+                told = any(_means(literal.args[0], o) and self._is(literal, o) for o in made)
+            if told:
+                return event.time_s, event.text
+        return 0.0, f"{literal} from the start"
+
+    def _is(self, literal: Literal, instance: str) -> bool:
+        ground = Literal(literal.predicate, (instance, *literal.args[1:]), literal.value)
+        return self.graph.truth(ground) is Truth.TRUE
 
     def why(self, literal: Literal) -> str:
         """How a literal that does not hold looks instead."""
@@ -86,13 +102,45 @@ class TruthGoalChecker:
         return not failures, weak, failures
 
 
+def irreversible(goal: Goal, oracle: OracleView) -> tuple[tuple[float, str], ...]:
+    """What must never happen for a goal and has happened; () if nothing has.
+
+    A variable of the goal means any instance of its category here: what was spoiled is lost, also
+    where another thing served in the end.
+
+    Returns:
+        For each such literal the simulated seconds of its first event and that event in words, in
+        the order of time; 0 seconds for what was so from the start.
+    """
+    history = _History.of(oracle)
+    kinds = dict(goal.variables)
+    literals = dict.fromkeys(literal.bind(kinds) for literal in goal.never)
+    found = {history.first(literal) for literal in literals if history.happened(literal)}
+    return tuple(sorted(found))
+
+
 def _facts(events: Sequence[Event]) -> Iterator[Literal]:
-    for event in events:
-        if event.kind in ("state", "relation"):
-            try:
-                yield Literal.parse(event.text)
-            except InputError:
-                continue
+    yield from (fact for event in events if (fact := _fact(event)) is not None)
+
+
+def _fact(event: Event) -> Literal | None:
+    """The literal that an event says became true, if it says one."""
+    if event.kind not in ("state", "relation"):
+        return None
+    try:
+        return Literal.parse(event.text)
+    except InputError:
+        return None
+
+
+def _covers(literal: Literal, fact: Literal) -> bool:
+    """Whether a fact about instances is one that a literal of a goal speaks of."""
+    return (
+        fact.predicate == literal.predicate
+        and fact.value == literal.value
+        and len(fact.args) == len(literal.args)
+        and all(_means(a, b) for a, b in zip(literal.args, fact.args, strict=True))
+    )
 
 
 def _means(name: str, instance: str) -> bool:
@@ -144,4 +192,4 @@ def _bindings(
             yield {v: n for (v, _), n in zip(variables, names, strict=True)}
 
 
-__all__ = ["TruthGoalChecker"]
+__all__ = ["TruthGoalChecker", "irreversible"]

@@ -9,10 +9,19 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from forestall.benchmark.cases import Case
 from forestall.errors import FileFormatError
 
 ROW_FORMAT = 1
 """Raised whenever a field changes its meaning; rows of another format are refused."""
+
+
+def row_key(case: Case, strategy: str, detector: str, threshold: float, without: str | None) -> str:
+    """The key of an episode: readable, unique within an experiment, fit for a folder's name."""
+    parts = [case.scenario or f"undisturbed-{case.task}", str(case.seed), strategy]
+    if strategy not in ("none", "watch"):
+        parts += [detector, f"{threshold:.2f}"]
+    return "_".join([*parts, *([f"without-{without}"] if without else [])])
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +38,7 @@ class Judged:
         confirmed: whether the reasoner found something that must change.
         replanned: whether a new plan was adopted.
         cause: the diagnosis in words, empty without alarm.
+        looks: how many looks it took.
         scores: of every watching detector by name, None where it had nothing to compare with.
         possible: truth: the next subtask could be carried out now.
         reachable: truth: what is left of the plan would reach the goal from here.
@@ -43,6 +53,7 @@ class Judged:
     confirmed: bool = False
     replanned: bool = False
     cause: str = ""
+    looks: int = 1
     scores: dict[str, float | None] = field(default_factory=dict, hash=False)
     possible: bool | None = None
     reachable: bool | None = None
@@ -79,7 +90,9 @@ class EpisodeRow:
             language models.
         simulated_s: robot time.
         compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
-        versions: of software and machine.
+        implied: whether it was not executed: its detector never alarms on what the unmonitored run
+            shows, so that the run is that one.
+        provenance: configuration, versions, demonstrations.
     """
 
     set: str
@@ -111,7 +124,19 @@ class EpisodeRow:
     simulated_s: float
     compute_s: dict[str, float] = field(hash=False)
     reasoning_s: float = 0.0
-    versions: dict[str, str | None] = field(default_factory=dict, hash=False)
+    implied: bool = False
+    provenance: dict[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def key(self) -> str:
+        """What makes an episode the same one within an experiment."""
+        return row_key(
+            Case(self.set, self.task, self.scenario, self.seed),
+            self.strategy,
+            self.detector,
+            self.threshold,
+            self.without,
+        )
 
     @property
     def failing(self) -> bool:

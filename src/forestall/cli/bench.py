@@ -83,7 +83,8 @@ def episodes(
 
     Args:
         task: tasks to run undisturbed; all by default, none when only scenarios are named.
-        scenario: scenarios to run; "all" for every shipped one; none by default.
+        scenario: scenarios to run, or names of sets (see `forestall scenarios`); "all" for every
+            shipped one; none by default.
         strategy: strategies; none and proactive by default.
         seeds: scenes, e.g. 100:120 for 100 to 119.
         memory: a demonstration file; the ready-made one of each task by default.
@@ -95,14 +96,15 @@ def episodes(
         as_json: print JSON instead of the table.
         quiet: no progress on standard error.
     """
-    from forestall.benchmark.files import scenario_names, task_names
+    from forestall.benchmark.files import SETS, scenario_names, task_names
     from forestall.cli.progress import bar
     from forestall.errors import InputError
     from forestall.survey import jobs_for, parse_seeds, survey, table
 
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs {jobs}: at least 1 is needed")
-    scenarios = list(scenario_names()) if scenario == ["all"] else scenario or []
+    of_sets = {"all": scenario_names(), **{of: scenario_names(of) for of in SETS}}
+    scenarios = [s for name in scenario or [] for s in of_sets.get(name, (name,))]
     tasks = task or ([] if scenarios else list(task_names()))
     todo = jobs_for(
         tasks,

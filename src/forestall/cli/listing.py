@@ -45,11 +45,18 @@ def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
     return 0
 
 
-def scenarios(*, task: str | None = None, as_json: Json = False, schema: Schema = False) -> int:
+def scenarios(
+    *,
+    task: str | None = None,
+    of: Annotated[str, Parameter(name="--set")] = "examples",
+    as_json: Json = False,
+    schema: Schema = False,
+) -> int:
     """List the shipped scenarios.
 
     Args:
         task: only those of one task.
+        of: which set: examples, robofail, irreversible, harmless, or all.
         as_json: print them as JSON, complete.
         schema: print the JSON schema of scenario files instead.
     """
@@ -60,7 +67,8 @@ def scenarios(*, task: str | None = None, as_json: Json = False, schema: Schema 
         return 0
     if task is not None:
         load_task(task)
-    loaded = [s for s in map(load_scenario, scenario_names()) if task in (None, s.task)]
+    names = scenario_names(None if of == "all" else of)
+    loaded = [s for s in map(load_scenario, names) if task in (None, s.task)]
     if as_json:
         rows = [
             {
@@ -69,6 +77,10 @@ def scenarios(*, task: str | None = None, as_json: Json = False, schema: Schema 
                 "kind": s.kind,
                 "title": s.title,
                 "cause": s.cause,
+                "set": s.set,
+                "source": s.source,
+                "known": s.known,
+                "effect": s.effect,
                 "faults": [f.model_dump(mode="json", exclude_defaults=False) for f in s.faults],
             }
             for s in loaded

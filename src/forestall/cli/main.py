@@ -14,6 +14,7 @@ import cyclopts
 from cyclopts import App
 
 import forestall
+from forestall.cli import experiments
 from forestall.cli.bench import bench
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
@@ -33,6 +34,7 @@ for command in (run, tasks, scenarios, check, compare, doctor):
     app.command(command)
 app.command(demos)
 app.command(bench)
+experiments.register(bench)
 app.command(encoder)
 
 

@@ -46,11 +46,22 @@ class SceneGraphDetector:
 
     A reference that had not yet found an argument that is in sight here cannot say how it should
     be, and is not compared with.
+
+    Args:
+        scorer: compares graphs.
+        config: the threshold.
+        name: told apart where several, each with a part of the score left out, watch one run.
     """
 
     name = "scene-graph"
 
-    def __init__(self, scorer: GraphScorer, config: DetectorConfig | None = None) -> None:
+    def __init__(
+        self,
+        scorer: GraphScorer,
+        config: DetectorConfig | None = None,
+        name: str = name,
+    ) -> None:
+        self.name = name
         self._scorer = scorer
         self._config = config or DetectorConfig()
 
@@ -97,10 +108,10 @@ def unseen_arguments(
     same = [r for r in references if r.subtask.skill == subtask.skill] or list(references)
     unseen = []
     for role, name in subtask.roles().items():
-        if any(_located(observed.get(i)) for i in observed.matches(name)):
+        if any(is_located(observed.get(i)) for i in observed.matches(name)):
             continue
         shown = [
-            _located(r.graph.get(argument))
+            is_located(r.graph.get(argument))
             for r in same
             if (argument := r.subtask.roles().get(role)) is not None
         ]
@@ -121,5 +132,6 @@ def unseen_by(reference: Reference, observed: SceneGraph) -> tuple[str, ...]:
     )
 
 
-def _located(node: ObjectNode | None) -> bool:
+def is_located(node: ObjectNode | None) -> bool:
+    """Whether an object is there with a box, in view or remembered."""
     return node is not None and node.box_m is not None and node.seen is not Seen.UNOBSERVED

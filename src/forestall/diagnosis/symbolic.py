@@ -1,7 +1,8 @@
 """Diagnosis without a language model: which fact that held in every demonstration fails now.
 
-Called by the proactive strategy. Preconditions are mined from the retrieved demonstrations by the
-callables given to the constructor; nothing is asked of a simulator.
+Called by the strategies. Preconditions are mined from the retrieved demonstrations by the callables
+given to the constructor; nothing is asked of a simulator. After a subtask the references show what
+held after it, and the same mining gives its postconditions.
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from forestall.grounding import is_open_support
 from forestall.types.facts import GRIPPER, Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-from forestall.types.runtime import BoundaryContext
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.verdict import Diagnosis, Precondition, Reference, Verdict, Violation
 from forestall.vocabulary import Vocabulary
 
@@ -60,7 +62,7 @@ class SymbolicReasoner:
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         """Name the violated facts about the subtask's arguments; unobserved ones do not count."""
-        subtask, graph = context.subtask, context.graph
+        subtask, graph, when = context.subtask, context.graph, context.when
         if not context.references:
             return self._nothing(f"there is no demonstration to compare {subtask} with")
         preconditions = self.mine(
@@ -69,21 +71,20 @@ class SymbolicReasoner:
         broken = [
             v
             for v in self.violations(preconditions, graph, subtask)
-            if v.truth is Truth.FALSE
-            and _concerns(v, self.vocabulary)
-            and not _is_the_effect(v.precondition.literal, subtask)
+            if v.truth is Truth.FALSE and _counts(v, subtask, graph, when, self.vocabulary)
         ]
         if not broken:
             count = len(context.references)
             return self._nothing(
-                f"nothing that held before {subtask.skill} in the {count} retrieved "
+                f"nothing that held {when.value} {subtask.skill} in the {count} retrieved "
                 f"demonstration{'s' if count != 1 else ''} is violated"
             )
         broken.sort(key=lambda v: (-v.precondition.weight, _rank(v.literal), v.literal))
         failed = {v.literal for v in broken}
         ground = (p.literal.bind(subtask.roles()) for p in preconditions)
         stay = {x for x in ground if x not in failed and graph.truth(x) is Truth.TRUE}
-        causes = [explain(v, graph, context.plan.subtasks[context.index]) for v in broken]
+        planned = context.plan.subtasks[context.index]
+        causes = [explain(v, graph, planned, when) for v in broken]
         culprits = dict.fromkeys(
             y for v in broken for x in _culprits(v.literal, graph) for y in _ids(graph, x)
         )
@@ -99,6 +100,33 @@ class SymbolicReasoner:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
 
 
+def _counts(
+    violation: Violation, subtask: Subtask, graph: SceneGraph, when: When, vocabulary: Vocabulary
+) -> bool:
+    """Whether a violated fact matters before a subtask, or after it."""
+    lifted = violation.precondition.literal
+    if when is When.BEFORE:
+        return _concerns(violation, vocabulary) and not _is_the_effect(lifted, subtask)
+    if lifted in _PUT:
+        return not _on_another(violation.literal, graph, vocabulary)
+    return _concerns(violation, vocabulary)
+
+
+_PUT = (
+    Literal("inside", ("?object", "?target")),
+    Literal("on_top_of", ("?object", "?target")),
+)
+"""What putting something somewhere brings about."""
+
+
+def _on_another(literal: Literal, graph: SceneGraph, vocabulary: Vocabulary) -> bool:
+    """Whether a thing stands on another instance of a support of which any will do."""
+    thing, target = literal.args
+    return is_open_support(vocabulary, category_of(target)) and any(
+        category_of(parent) == category_of(target) for parent in graph.parents(thing)
+    )
+
+
 def _is_the_effect(literal: Literal, subtask: Subtask) -> bool:
     """Whether a fact is violated only because what the subtask is to bring about holds already.
 
@@ -112,7 +140,9 @@ def _ids(graph: SceneGraph, name: str) -> tuple[str, ...]:
     return graph.matches(name) or ((name,) if is_instance(name) else ())
 
 
-def explain(violation: Violation, graph: SceneGraph, subtask: Subtask) -> str:
+def explain(
+    violation: Violation, graph: SceneGraph, subtask: Subtask, moment: When = When.BEFORE
+) -> str:
     """One sentence: what is the case, and what it was in the demonstrations."""
     literal, p = violation.literal, violation.precondition
     many = f"all {p.total}" if p.support == p.total else f"{p.support} of {p.total}"
@@ -120,7 +150,7 @@ def explain(violation: Violation, graph: SceneGraph, subtask: Subtask) -> str:
     name = literal.args[0] if literal.args else ""
     predicate = literal.predicate
     if predicate == "vacant" and literal.value == "true":
-        return f"{_listed(graph, name)} {name}, which is empty {when} before {subtask}"
+        return f"{_listed(graph, name)} {name}, which is empty {when} {moment.value} {subtask}"
     if literal.is_state:
         node = graph.get(name)
         now = node.state(predicate) if node is not None else None

@@ -2,8 +2,9 @@
 
 Called by the store; calls nothing. The steps of one run share most of their nodes and relations, so
 each distinct one is written once, in sorted order, and a graph is lists of rising positions in
-them. That makes reading fast: whatever rises is sorted and unique already. A node's image feature
-is written where it has one, so files with and without are of one format.
+them. That makes reading fast: whatever rises is sorted and unique already. What not every run has
+(image features of nodes, views of pictures, what was known after the last step) is written where it
+is, beside what the graphs share, so files with and without are of one format.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from itertools import pairwise
 from typing import Any
 
 from forestall.errors import ForestallError, InputError
-from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.demonstration import Demonstration, DemonstrationStep, View
 from forestall.types.facts import RELATIONS
+from forestall.types.feature import whole_numbers
 from forestall.types.graph import GRAPH_FORMAT, Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import Vec3
 from forestall.types.plan import Subtask
@@ -42,7 +44,10 @@ class EncodedStep:
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """One demonstration as columns of the file; `digest` is the hash of its content."""
+    """One demonstration as columns of the file; `digest` is the hash of its content.
+
+    `things` is what the steps share, and what is there of the run but not of each step.
+    """
 
     task: str
     scene: str
@@ -69,27 +74,33 @@ class Encoded:
 def encode(demonstration: Demonstration) -> Encoded:
     """The columns of a demonstration; equal demonstrations give equal bytes."""
     graphs = [g for s in demonstration.steps for g in (s.graph, s.whole)]
-    forms = [g.to_json() for g in graphs]
+    last = () if demonstration.final is None else (demonstration.final,)
+    forms = [g.to_json() for g in (*graphs, *last)]
     node_texts = sorted({(n["id"], _dump(n)) for f in forms for n in f["nodes"]})
     relations = sorted({tuple(r) for f in forms for r in f["relations"]})
     node_at = {text: i for i, (_, text) in enumerate(node_texts)}
     relation_at = {r: i for i, r in enumerate(relations)}
-    blobs = [
-        _pack(
-            {
-                "subtask": f["subtask"],
-                "nodes": [node_at[_dump(n)] for n in f["nodes"]],
-                "relations": [relation_at[tuple(r)] for r in f["relations"]],
-                "hidden": f["hidden"],
-            }
-        )
+    columns = [
+        {
+            "subtask": f["subtask"],
+            "nodes": [node_at[_dump(n)] for n in f["nodes"]],
+            "relations": [relation_at[tuple(r)] for r in f["relations"]],
+            "hidden": f["hidden"],
+        }
         for f in forms
     ]
-    things = {
+    blobs = [_pack(c) for c in columns[: len(graphs)]]
+    things: dict[str, Any] = {
         "format": GRAPH_FORMAT,
         "nodes": [json.loads(text) for _, text in node_texts],
         "relations": relations,
     }
+    if last:
+        things["final"] = columns[-1]
+    if any(s.view is not None for s in demonstration.steps):
+        things["views"] = [
+            None if s.view is None else _view_json(s.view) for s in demonstration.steps
+        ]
     return Encoded(
         task=demonstration.task,
         scene=demonstration.scene,
@@ -130,6 +141,8 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
         if any(r.predicate not in known for r in relations):
             raise DamageError(f"demonstration {name} has a relation that is not known")
         subtasks: dict[str, Subtask] = {}
+        views = [_view(v) for v in things.get("views", [None] * len(encoded.steps))]
+        final = things.get("final")
         steps = tuple(
             DemonstrationStep(
                 index=s.index,
@@ -137,9 +150,11 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
                 graph=_graph(_unpack(s.graph), nodes, relations, subtasks),
                 whole=_graph(_unpack(s.whole), nodes, relations, subtasks),
                 image=s.image,
+                view=view,
             )
-            for s in encoded.steps
+            for s, view in zip(encoded.steps, views, strict=True)
         )
+        last = None if final is None else _graph(final, nodes, relations, subtasks)
         perception = tuple((str(k), str(v)) for k, v in json.loads(encoded.perception))
     except (zlib.error, ValueError, KeyError, IndexError, TypeError, InputError) as error:
         raise DamageError(f"demonstration {name} is damaged: {error!r}") from error
@@ -151,7 +166,31 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
         perception=perception,
         version=encoded.version,
         id=name,
+        final=last,
     )
+
+
+def _view_json(view: View) -> dict[str, str | None]:
+    image = None if view.image is None else base64.b64encode(view.image).decode("ascii")
+    return {
+        "image": image,
+        "caption": view.caption,
+        "encoder": view.encoder,
+        "captioner": view.captioner,
+    }
+
+
+def _view(data: dict[str, Any] | None) -> View | None:
+    if data is None:
+        return None
+    texts = (data["caption"], data["encoder"], data["captioner"])
+    if not all(isinstance(t, str) for t in texts):
+        raise DamageError("a stored view is no view")
+    image = data["image"]
+    if image is not None:
+        image = base64.b64decode(image, validate=True)
+        whole_numbers(image)
+    return View(image, *texts)
 
 
 def _node(data: dict[str, Any]) -> ObjectNode:

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from forestall.types.demonstration import Demonstration, DemonstrationStep
-from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
+from forestall.types.demonstration import Demonstration, DemonstrationStep, View
+from forestall.types.episode import BoundaryRecord, EpisodeEnd, EpisodeRecord, SkillStatus
 from forestall.types.observation import Rgb
+from forestall.types.runtime import When
 
 
 def demonstration_from(
-    record: EpisodeRecord, version: str, keep_image: Callable[[Rgb], str] | None = None
+    record: EpisodeRecord,
+    version: str,
+    keep_image: Callable[[Rgb], str] | None = None,
+    view_of: Callable[[BoundaryRecord], View | None] | None = None,
 ) -> Demonstration | None:
     """The demonstration of a record, None when the run or one of its steps did not succeed.
 
@@ -21,6 +25,7 @@ def demonstration_from(
         record: a scored run of an undisturbed task.
         version: of the software, for the store.
         keep_image: stores a picture and returns its content hash; None keeps no pictures.
+        view_of: says what the picture of a boundary comes down to; None keeps no views.
     """
     smooth = all(e.outcome.status is SkillStatus.SUCCEEDED for e in record.executed)
     if not (record.success and smooth and record.end is EpisodeEnd.PLAN_FINISHED):
@@ -39,9 +44,12 @@ def demonstration_from(
                 image=None
                 if keep_image is None or b.observation is None
                 else keep_image(b.observation.frames[-1].rgb),
+                view=None if view_of is None else view_of(b),
             )
             for b in record.boundaries
+            if b.when is When.BEFORE
         ),
         perception=tuple(sorted(perception.items())),
         version=version,
+        final=record.final,
     )

@@ -139,6 +139,8 @@ def _reference(entry: _Entry, similarity: float) -> Reference:
         similarity=similarity,
         graph=entry.step.graph,
         later=tuple(s.subtask for s in demonstration.steps[entry.position :]),
+        view=entry.step.view,
+        after=demonstration.after(entry.position),
     )
 
 

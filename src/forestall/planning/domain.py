@@ -178,6 +178,11 @@ def _put(state: State, name: str, receptacle: str) -> None:
         raise _RefusedError(f"{receptacle} is itself in or on {name}")
     if state.vocabulary.encloses(receptacle) and state.value(receptacle, "open") == "closed":
         raise _RefusedError(f"{receptacle} is closed", Literal("open", (receptacle,), "open"))
+    device = state.category(receptacle).device
+    if device and device.shut_while_on and state.value(receptacle, "toggled") == "on":
+        raise _RefusedError(
+            f"{receptacle} is on and takes nothing", Literal("toggled", (receptacle,), "off")
+        )
     if not state.has_room(receptacle):
         inside = ", ".join(state.contents(receptacle, shape.relation))
         raise _RefusedError(

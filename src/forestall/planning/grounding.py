@@ -11,7 +11,7 @@ from typing import NamedTuple
 from forestall.planning.problem import Atom
 from forestall.planning.relevance import Conjunction, Universe
 from forestall.planning.state import State, by_number
-from forestall.types.facts import category_of
+from forestall.types.facts import Literal, category_of
 from forestall.vocabulary import Category
 
 MAX_DEPTH = 3
@@ -63,6 +63,14 @@ class Layout:
                 parent = self.parent(place)
                 if parent is not None:
                     self._holders.setdefault(parent, []).append((x, place))
+
+    def safe(self, literal: Literal) -> bool:
+        """Whether a literal forbids harm to a thing that nothing in the problem can harm."""
+        if literal.predicate != "spoiled" or literal.value != "false":
+            return False
+        name = literal.args[0]
+        outside = name not in self.universe.things and name not in self._made
+        return outside and name not in self.state.spoiled
 
     def kind(self, name: str) -> str:
         """The category name of an existing or makeable thing."""

@@ -86,6 +86,14 @@ def negated(literal: Literal) -> Literal:
     return Literal(f"not {literal.predicate}", literal.args, literal.value)
 
 
+def _ban_kept(state: State, literal: Literal) -> bool:
+    """Whether a literal forbids something that is not so now."""
+    if literal.predicate.startswith("not "):
+        banned = Literal(literal.predicate.removeprefix("not "), literal.args, literal.value)
+        return not state.holds(banned)
+    return literal.value == "false" and state.holds(literal)
+
+
 def possible(state: State, category: str) -> tuple[str, ...]:
     """Instances of a category that exist and are located, and those that could be made."""
     existing = tuple(x for x in state.instances(category) if x not in state.lost)
@@ -176,9 +184,9 @@ class _Closure:
         self.purposeful.update(names)
 
     def want(self, literal: Literal) -> None:
-        """Keep what can bring a literal about."""
+        """Keep what can bring a literal about; a ban that is kept now asks for nothing."""
         state = self.state
-        if literal.predicate == "spoiled":
+        if literal.predicate == "spoiled" or _ban_kept(state, literal):
             return
         for arg in literal.args:
             if arg != GRIPPER and not arg.startswith("?"):

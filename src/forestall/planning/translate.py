@@ -53,7 +53,12 @@ def translate(state: State, goals: Sequence[Conjunction], universe: Universe) ->
     refused: UnsupportedError | None = None
     for goal in goals:
         try:
-            atoms = [a for literal in goal for a in _goal_atoms(layout, literal)]
+            atoms = [
+                a
+                for literal in goal
+                if not layout.safe(literal)
+                for a in _goal_atoms(layout, literal)
+            ]
         except UnsupportedError as error:
             refused = error
             continue
@@ -113,6 +118,9 @@ def _put(layout: Layout, effects: Automatic, x: str, receptacle: str) -> Iterato
     condition += layout.quiet(receptacle)
     if layout.state.vocabulary.encloses(receptacle):
         condition.append(("is", receptacle, "open", "open"))
+    device = layout.state.category(receptacle).device
+    if device and device.shut_while_on and layout.has(receptacle, "toggled"):
+        condition.append(("is", receptacle, "toggled", "off"))
     changes = effects.arrival(x, receptacle)
     for room, taken, left in layout.room(receptacle):
         yield Draft(

@@ -59,6 +59,15 @@ class GraphValidator:
         return PlanCheck(not missing, None, reason, (), missing, assumed)
 
 
+@dataclass(frozen=True, slots=True)
+class AcceptAll:
+    """Accepts every plan unseen (implements `PlanValidator`): the ablation without validation."""
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        """Say yes."""
+        return PlanCheck(True)
+
+
 def observed(graph: SceneGraph, vocabulary: Vocabulary) -> State:
     """The state of a graph, after what the running devices have done by now."""
     state = State.from_graph(graph, vocabulary)

@@ -78,6 +78,7 @@ def record_json(
         "page": page,
         "events": [event_json(e) for e in record.events],
         "boundaries": _boundaries(record, images),
+        "final": None if record.final is None else record.final.to_json(features=False),
     }
     return {key: plain(value) for key, value in data.items()}
 
@@ -113,6 +114,7 @@ def boundary_json(
     return {
         "position": position,
         "index": b.index,
+        "when": b.when,
         "subtask": str(b.subtask),
         "mark": mark,
         "time_s": b.time_s,
@@ -128,6 +130,7 @@ def boundary_json(
         "plan_before": [str(s) for s in before],
         "plan_after": None if after is None else [str(s) for s in after],
         "seconds": dict(b.seconds),
+        "watched": [_watched(v) for v in b.watched],
     }
 
 
@@ -136,6 +139,7 @@ def alarm_json(alarm: Alarm) -> dict[str, Any]:
     return {
         "position": alarm.position,
         "index": alarm.index,
+        "when": alarm.when,
         "subtask": str(alarm.subtask),
         "score": alarm.score,
         "threshold": alarm.threshold,
@@ -228,6 +232,17 @@ def _verdict(verdict: Verdict) -> dict[str, Any]:
             }
             for d in verdict.discrepancies
         ],
+        "note": verdict.note,
+    }
+
+
+def _watched(verdict: Verdict) -> dict[str, Any]:
+    """What a further detector said, without what it said it by."""
+    return {
+        "detector": verdict.detector,
+        "decision": verdict.decision,
+        "score": verdict.score,
+        "threshold": verdict.threshold,
         "note": verdict.note,
     }
 

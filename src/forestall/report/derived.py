@@ -19,7 +19,7 @@ from forestall.types.episode import (
 )
 from forestall.types.facts import category_of
 from forestall.types.plan import Plan, Subtask, same_step
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.verdict import Decision, Replan, ReplanOutcome
 
 SIMULATOR_PHASES = frozenset({"act", "observe"})
@@ -56,14 +56,16 @@ class Alarm:
     culprits: tuple[str, ...]
     replanned: bool
     outcome: ReplanOutcome | None
+    when: When = When.BEFORE  # of the subtask
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
     """A boundary, the subtask that was executed after it, or both.
 
-    `before` is the plan for the rest of the task when the boundary came, this subtask first;
-    `after` is the plan that replaced it, None where it stayed.
+    A boundary after a subtask, or at the end of the plan, is a moment of its own. `before` is the
+    plan for the rest of the task when the boundary came, this subtask first where it is still to be
+    done; `after` is the plan that replaced it, None where it stayed.
     """
 
     position: int | None  # of the boundary in the record
@@ -80,6 +82,11 @@ class Moment:
             return self.boundary.subtask
         assert self.executed is not None
         return self.executed.subtask
+
+    @property
+    def when(self) -> When:
+        """Whether the subtask was about to be done, had been done, or was the plan's last."""
+        return When.BEFORE if self.boundary is None else self.boundary.when
 
     @property
     def alarm(self) -> bool:
@@ -133,6 +140,8 @@ def boundary_of(index: int, context: BoundaryContext, answer: StrategyAnswer) ->
         why=answer.why,
         seconds=answer.seconds,
         time_s=context.observation.time_s,
+        when=context.when,
+        watched=answer.watched,
     )
 
 
@@ -181,6 +190,7 @@ def alarm_at(position: int, boundary: BoundaryRecord, plan: Plan | None) -> Alar
         culprits=() if diagnosis is None else diagnosis.culprits,
         replanned=plan is not None,
         outcome=outcome_of(boundary),
+        when=boundary.when,
     )
 
 
@@ -189,7 +199,9 @@ def adopted(boundary: BoundaryRecord, executed: Sequence[ExecutedRecord]) -> Pla
 
     A run whose number of plans is used up executes the subtask of the boundary all the same.
     """
-    kept = any(e.index == boundary.index and e.subtask == boundary.subtask for e in executed)
+    kept = boundary.when is When.BEFORE and any(
+        e.index == boundary.index and e.subtask == boundary.subtask for e in executed
+    )
     return None if kept else new_plan(boundary.replan)
 
 
@@ -201,8 +213,9 @@ def replans(record: EpisodeRecord) -> int:
 def moments(record: EpisodeRecord) -> tuple[Moment, ...]:
     """The run as a sequence of moments, in order.
 
-    Several boundaries may share one index (a second look, or a new plan whose first step is judged
-    again); the executed subtask belongs to the last of them if it is the one that was judged.
+    Several boundaries may share one index: a second look, a new plan whose first step is judged
+    again, and what was seen after the subtask. The executed subtask belongs to the last of those
+    before it, if it is the one that was judged.
     """
     executed = {e.index: e for e in record.executed}
     of_index: dict[int, list[int]] = {}
@@ -213,13 +226,15 @@ def moments(record: EpisodeRecord) -> tuple[Moment, ...]:
     for index in sorted(executed.keys() | of_index.keys()):
         positions = of_index.get(index, [])
         done = executed.get(index)
+        starts = [p for p in positions if record.boundaries[p].when is not When.AFTER]
         for position in positions:
             boundary = record.boundaries[position]
-            before = plan[_progress(record, adopted_at, index) :]
+            reached = index + (boundary.when is When.AFTER)
+            before = plan[_progress(record, adopted_at, reached) :]
             after = adopted(boundary, record.executed)
             if after is not None:
-                plan, adopted_at = after.subtasks, index
-            mine = done if position == positions[-1] else None
+                plan, adopted_at = after.subtasks, reached
+            mine = done if position in starts[-1:] else None
             if mine is not None and not same_step(mine.subtask, boundary.subtask):
                 mine = None
             result.append(
@@ -259,7 +274,9 @@ def _mark(
         return Mark.UNJUDGED
     if verdict.decision is Decision.REPLAN:
         assert boundary is not None
-        dismissed = outcome_of(boundary) in (None, ReplanOutcome.NOTHING_TO_CHANGE)
+        diagnosis = boundary.diagnosis
+        found = diagnosis is not None and bool(diagnosis.must_change)
+        dismissed = not found or outcome_of(boundary) is ReplanOutcome.NOTHING_TO_CHANGE
         return Mark.DISMISSED if dismissed else Mark.UNSOLVED
     if verdict.decision is Decision.LOOK_AGAIN:
         return Mark.LOOKED
@@ -288,9 +305,15 @@ def _key(subtask: Subtask) -> tuple[str, ...]:
     return (subtask.skill, *map(category_of, subtask.args))
 
 
-def done_before(record: EpisodeRecord, index: int) -> tuple[ExecutedRecord, ...]:
-    """What had been executed before a boundary with this index."""
-    return tuple(e for e in sorted(record.executed, key=lambda e: e.index) if e.index < index)
+def done_before(record: EpisodeRecord, boundary: BoundaryRecord) -> tuple[ExecutedRecord, ...]:
+    """What had been executed when a boundary came."""
+    reached = boundary.index + (boundary.when is When.AFTER)
+    return tuple(e for e in sorted(record.executed, key=lambda e: e.index) if e.index < reached)
+
+
+def in_words(when: When) -> str:
+    """How a moment is said before the name of its subtask: "after put_on(Mug, Sink)"."""
+    return "at the end, after" if when is When.END else when.value
 
 
 def provenance_of(record: EpisodeRecord, name: str) -> Mapping[str, Any]:

@@ -83,6 +83,7 @@ class Drawing:
         rows: Sequence[Slot],
         said: Sequence[Discrepancy],
         top: float,
+        moment: str = "next",
     ) -> None:
         self.me, self.you, self.said, self.top = me, you, said, top
         self.apart = any(s.path[0] == GRIPPER for s in rows) and any(
@@ -102,7 +103,7 @@ class Drawing:
             max(text_width(x.label, EDGE) for x in self.lanes if x.lane == i) + 12
             for i in range(max((x.lane for x in self.lanes), default=-1) + 1)
         ]
-        self.subtask = None if me.graph.subtask is None else f"next: {me.graph.subtask}"
+        self.subtask = None if me.graph.subtask is None else f"{moment}: {me.graph.subtask}"
         pill = 0.0 if self.subtask is None else text_width(self.subtask, NAME) + 40
         note = text_width(self.note, EDGE) if self.note else 0.0
         self.width = max(self.lane_x + sum(self.widths), pill, note + 20, 260.0) + MARGIN

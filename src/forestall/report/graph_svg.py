@@ -40,6 +40,7 @@ def graph_svg(
     discrepancies: Sequence[Discrepancy],
     side: SideName,
     *,
+    done: bool = False,
     standalone: bool = False,
 ) -> str:
     """Draw `graph` as SVG.
@@ -50,6 +51,7 @@ def graph_svg(
         matches: (observed id, expected id) pairs; none: nodes with the same id are the same.
         discrepancies: differences to mark beside those that follow from the matches.
         side: whether `graph` is the observed or the expected one.
+        done: whether the subtask of the graphs is over; otherwise it comes next.
         standalone: carry namespace and style sheet along, for a file of its own.
 
     Returns:
@@ -62,7 +64,7 @@ def graph_svg(
     rows = slots(left, right)
     top = head_room(left, right)
     drawings = [
-        Drawing(me, you, rows, discrepancies, top)
+        Drawing(me, you, rows, discrepancies, top, "done" if done else "next")
         for me, you in ((left, right), (right, left))
         if me is not None
     ]

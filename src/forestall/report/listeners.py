@@ -14,9 +14,10 @@ from rich.live import Live
 from rich.markup import escape
 from rich.text import Text
 
+from forestall.report.derived import in_words
 from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.task import Task
 from forestall.types.verdict import Decision
 
@@ -73,18 +74,18 @@ class ProgressLine:
     def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
         """A boundary was judged."""
         self._now = str(context.subtask)
-        remaining = len(context.plan) - context.index
+        remaining = len(context.plan) - context.index - (context.when is When.AFTER)
         verdict = answer.verdict
         if verdict is not None and verdict.decision is Decision.REPLAN:
             self._alarms += 1
             cause = "" if answer.diagnosis is None else f": {answer.diagnosis.cause}"
-            self._say(f"alarm before {context.subtask}{cause}", "yellow")
+            self._say(f"alarm {in_words(context.when)} {context.subtask}{cause}", "yellow")
         plan = None if answer.replan is None else answer.replan.plan
         if answer.decision is Decision.REPLAN and plan is not None:
             remaining = len(plan)
             self._say(f"new plan: {remaining} subtasks", "cyan")
         if answer.decision is Decision.STOP:
-            self._say(f"stopped before {context.subtask}: {answer.why}", "red")
+            self._say(f"stopped {in_words(context.when)} {context.subtask}: {answer.why}", "red")
         self._total = self._done + remaining
         self._refresh()
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from forestall.report.derived import in_words
 from forestall.report.graph_svg import graph_css
 from forestall.report.page_view import duration, page_view, status_sign
 from forestall.report.record import replace_file
@@ -30,6 +31,7 @@ def page_html(record: EpisodeRecord) -> str:
     )
     environment.filters["duration"] = duration
     environment.filters["sign"] = status_sign
+    environment.filters["in_words"] = in_words
     environment.filters["svg"] = Markup  # graph_svg escapes its own texts
     folder = files("forestall.report").joinpath("templates")
     style = folder.joinpath("page.css").read_text(encoding="utf-8")

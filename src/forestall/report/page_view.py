@@ -17,6 +17,7 @@ from forestall.report.derived import (
     alarms,
     cause_of,
     done_before,
+    in_words,
     moments,
     outcome_of,
     plan_rows,
@@ -27,7 +28,7 @@ from forestall.report.graph_svg import graph_svg
 from forestall.report.pictures import Picture, page_picture
 from forestall.types.episode import EpisodeRecord, SkillStatus
 from forestall.types.observation import Observation
-from forestall.types.plan import Subtask
+from forestall.types.runtime import When
 from forestall.types.verdict import Verdict
 
 PICTURE_WIDTH, VIEW_WIDTH, THUMB_WIDTH = 480, 232, 132
@@ -88,6 +89,7 @@ class Page:
 
     record: EpisodeRecord
     cards: tuple[Card, ...]
+    heading: str
     alarms: tuple[Alarm, ...]
     places: Mapping[int, int]  # position of a boundary → number of its card
     legend: tuple[tuple[str, str, str, int], ...]  # class, sign, words, how many
@@ -117,6 +119,7 @@ def page_view(record: EpisodeRecord) -> Page:
     return Page(
         record=record,
         cards=cards,
+        heading=_heading(all_moments),
         alarms=alarms(record),
         places={c.moment.position: c.number for c in cards if c.moment.position is not None},
         legend=_legend(all_moments),
@@ -132,6 +135,13 @@ def page_view(record: EpisodeRecord) -> Page:
         ),
         provenance=tuple((str(k), _words(v)) for k, v in record.provenance),
     )
+
+
+def _heading(found: Sequence[Moment]) -> str:
+    """What the cards are about."""
+    times = {m.when for m in found}
+    words = "Before and after each subtask" if When.AFTER in times else "Before each subtask"
+    return f"{words}, and at the end" if When.END in times else words
 
 
 def _legend(found: Sequence[Moment]) -> tuple[tuple[str, str, str, int], ...]:
@@ -150,13 +160,13 @@ def _card(record: EpisodeRecord, number: int, moment: Moment, budget: int) -> Ca
     outcome = None if boundary is None else outcome_of(boundary)
     rows: tuple[PlanRow, ...] = ()
     if boundary is not None and moment.after is not None:
-        rows = plan_rows(done_before(record, boundary.index), moment.before, moment.after)
+        rows = plan_rows(done_before(record, boundary), moment.before, moment.after)
     return Card(
         number=number,
         moment=moment,
         look=look,
         sign=sign,
-        verb=_verb(moment.subtask),
+        verb=_verb(moment),
         args=" → ".join(moment.subtask.args),
         picture=picture,
         views=views,
@@ -172,8 +182,9 @@ def _card(record: EpisodeRecord, number: int, moment: Moment, budget: int) -> Ca
     )
 
 
-def _verb(subtask: Subtask) -> str:
-    return subtask.skill.removesuffix("_obj").replace("_", " ")
+def _verb(moment: Moment) -> str:
+    verb = moment.subtask.skill.removesuffix("_obj").replace("_", " ")
+    return verb if moment.when is When.BEFORE else f"{in_words(moment.when)} {verb}"
 
 
 def _pictures(
@@ -212,14 +223,14 @@ def _graphs(moment: Moment) -> tuple[str, str]:
     boundary = moment.boundary
     if boundary is None:
         return "", ""
-    verdict = boundary.verdict
+    verdict, done = boundary.verdict, moment.when is not When.BEFORE
     if verdict is None or verdict.nearest is None:
-        return graph_svg(boundary.scoped, None, (), (), "observed"), ""
+        return graph_svg(boundary.scoped, None, (), (), "observed", done=done), ""
     seen, wanted = boundary.scoped, verdict.nearest.graph
     pairs, found = verdict.matches, verdict.discrepancies
     return (
-        graph_svg(seen, wanted, pairs, found, "observed"),
-        graph_svg(wanted, seen, pairs, found, "expected"),
+        graph_svg(seen, wanted, pairs, found, "observed", done=done),
+        graph_svg(wanted, seen, pairs, found, "expected", done=done),
     )
 
 

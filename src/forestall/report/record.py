@@ -28,7 +28,7 @@ from forestall.report.derived import alarm_at, boundary_of, new_plan, reasoning_
 from forestall.report.pictures import encode_jpeg, file_name
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillOutcome
 from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.task import Task
 
 RECORD_NAME = "record.json"
@@ -65,6 +65,8 @@ class RunRecorder:
         self._page = page
         self._started = False
         self._position = 0
+        self._index = -1
+        self._looks = 0
 
     def on_start(self, task: Task, plan: Plan, seed: int) -> None:
         """The episode begins."""
@@ -73,6 +75,7 @@ class RunRecorder:
         (self.folder / LINES_NAME).write_text("", encoding="utf-8")
         self._started = True
         self._position = 0
+        self._index, self._looks = -1, 0
         self._write(
             "start",
             kind=KIND,
@@ -89,7 +92,11 @@ class RunRecorder:
 
     def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
         """A boundary was judged."""
-        boundary = boundary_of(self._position, context, answer)
+        again = context.looks == self._looks + 1 and context.looks > 1
+        if context.when is not When.AFTER and not again:
+            self._index += 1
+        self._looks = context.looks
+        boundary = boundary_of(self._index, context, answer)
         plan = new_plan(boundary.replan)
         alarm = alarm_at(self._position, boundary, plan)
         self._write(
@@ -99,7 +106,7 @@ class RunRecorder:
                 position=self._position,
                 image=_write_image(self.folder, boundary),
                 mark=None,
-                before=context.remaining(),
+                before=context.remaining()[context.when is When.AFTER :],
                 after=None if plan is None else plan.subtasks,
             ),
             alarm=None if alarm is None else alarm_json(alarm),
@@ -108,7 +115,7 @@ class RunRecorder:
 
     def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
         """A subtask was executed."""
-        executed = ExecutedRecord(subtask, outcome, max(0, self._position - 1))
+        executed = ExecutedRecord(subtask, outcome, max(0, self._index))
         self._write("executed", time_s=time_s, executed=executed_json(executed))
 
     def on_end(self, record: EpisodeRecord) -> None:
@@ -298,4 +305,5 @@ def _unfinished(start: Mapping[str, Any], events: Sequence[Mapping[str, Any]]) -
         "page": None,
         "events": [],
         "boundaries": boundaries,
+        "final": None,
     }

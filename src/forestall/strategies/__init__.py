@@ -1,1 +1,1 @@
-"""When a run may be interrupted: none · proactive. They see only L0."""
+"""When a run may be interrupted: none · watch · proactive · online · post-hoc. They see only L0."""

@@ -99,6 +99,7 @@ class EpisodeRecord:
     weak_success: bool | None = None  # REFLECT's own check
     failures: tuple[str, ...] = ()  # which goal facts failed, in words
     events: tuple[Event, ...] = ()  # oracle history, filled by the scorer
+    harmed: tuple[tuple[float, str], ...] = ()  # what must never happen and did: when, words
     simulated_s: float = 0.0
     compute_s: tuple[tuple[str, float], ...] = ()
     final: SceneGraph | None = None  # everything known after the last subtask, if anybody looked

@@ -46,6 +46,8 @@ class BoundaryContext:
         looks: how many times the robot looked at this boundary (1 at first).
         may_look: whether it may look once more.
         replans: how many plans were made in this episode so far.
+        when: at which moment this is. After the subtask `index` is still its own, at the end of the
+            plan it is the plan's length and `subtask` the last one.
     """
 
     task: Task
@@ -60,6 +62,7 @@ class BoundaryContext:
     looks: int = 1
     may_look: bool = True
     replans: int = 0
+    when: When = When.BEFORE
 
     def remaining(self) -> tuple[Subtask, ...]:
         """What is left of the plan, this subtask first (not grounded)."""

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+AXES = ("layout", "furniture", "colours", "light", "start", "clutter")
+"""What varies with a scene's seed and can be drawn anew on its own.
+
+"layout" is the whole floor plan, "furniture" only what stands free in it (table, chairs, shelf,
+bin, lamp, pictures), "start" where the robot is at first.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectNeed:
@@ -34,10 +41,16 @@ class SceneNeeds:
         objects: objects that must be there.
         fixtures: (fixture name, attribute, value) overrides, e.g. ("Microwave-1", "open", "open").
         clutter: smallest and largest number of further objects.
-        variety: which axes vary with the seed (layout, furniture, colours, light, start, clutter).
+        vary: (axis, number): axes that are drawn anew, each number in another way.
+        more_clutter: how many things to strew in beside the clutter, as far as there is room.
+        undisturbed: the needs before a scenario changed them. A scene of the same seed is the
+            undisturbed one but for what differs between the two.
     """
 
     room: str = "kitchen"
     objects: tuple[ObjectNeed, ...] = ()
     fixtures: tuple[tuple[str, str, str], ...] = ()
     clutter: tuple[int, int] = (2, 6)
+    vary: tuple[tuple[str, int], ...] = ()
+    more_clutter: int = 0
+    undisturbed: SceneNeeds | None = None

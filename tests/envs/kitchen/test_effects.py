@@ -245,6 +245,22 @@ def test_water_that_runs_over_food_in_a_pot_spoils_it():
     assert kitchen.state("Pot-1", "filled") == "water"
 
 
+@pytest.mark.parametrize(("food", "ruined"), [("Bread-1", True), ("Tomato-1", False)])
+def test_running_water_spoils_whole_food_that_soaks(food, ruined):
+    kitchen = SmallKitchen(f"{food}@Sink-1")
+    kitchen.do("toggle_on(Faucet)")
+    assert kitchen.spoiled == ({food} if ruined else set())
+
+
+@pytest.mark.parametrize("temperature", ["hot", "room"])
+def test_a_plant_is_as_hot_as_the_water_that_it_gets(temperature):
+    kitchen = SmallKitchen(
+        f"Pot-1@CounterTop-1 filled=water temperature={temperature}", "HousePlant-1@CounterTop-1"
+    )
+    kitchen.do("pick_up(Pot)", "pour(Pot, HousePlant)")
+    assert kitchen.state("HousePlant-1", "temperature") == temperature
+
+
 def test_things_that_are_no_food_are_not_spoiled_by_dirt_or_liquid():
     kitchen = SmallKitchen("Knife-1@CounterTop-1", "Sink-1")
     kitchen.do("pick_up(Knife)", "put_in(Knife, Sink)", "toggle_on(Faucet)")

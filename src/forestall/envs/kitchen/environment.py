@@ -19,6 +19,7 @@ from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.envs.kitchen import effects
 from forestall.envs.kitchen.household import Household, Placed
 from forestall.envs.kitchen.naming import RefusalError
+from forestall.envs.kitchen.rendering.memory import FrameMemory
 from forestall.envs.kitchen.skills import Robot, SkillTimes, perform
 from forestall.errors import ForestallError, SceneError
 from forestall.interfaces import Renderer, World
@@ -123,6 +124,7 @@ class KitchenEnvironment:
         effect_config: numbers of the automatic effects.
         build: makes the world of a seed; the embedded MuJoCo kitchen by default.
         make: makes the renderer of a world; by `renderer` name by default.
+        frames: what was drawn before; everything is drawn anew by default.
     """
 
     def __init__(
@@ -136,6 +138,7 @@ class KitchenEnvironment:
         effect_config: effects.EffectConfig | None = None,
         build: Build | None = None,
         make: MakeRenderer | None = None,
+        frames: FrameMemory | None = None,
     ) -> None:
         self._needs = needs
         self._vocabulary = vocabulary
@@ -145,7 +148,7 @@ class KitchenEnvironment:
         self._times = times or SkillTimes()
         self._effect_config = effect_config or effects.EffectConfig()
         self._build = build or _build_kitchen
-        self._make = make or _maker(renderer)
+        self._make = make or _maker(renderer, frames)
         self._seed: int | None = None
         self._released: tuple[str, Vec3] | None = None
         self._world: Stage | None = None
@@ -311,10 +314,12 @@ def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stag
     return build_scene(needs, seed, vocabulary)
 
 
-def _maker(renderer: str) -> MakeRenderer:
+def _maker(renderer: str, frames: FrameMemory | None) -> MakeRenderer:
     def make(world: Any, intrinsics: Intrinsics) -> Renderer:
-        from forestall.envs.kitchen.rendering import make_renderer
+        from forestall.envs.kitchen.rendering import make_remembering, make_renderer
 
+        if frames is not None:
+            return make_remembering(renderer, world.model, world.appearance, intrinsics, frames)
         return make_renderer(renderer, world.model, world.appearance, intrinsics)
 
     return make

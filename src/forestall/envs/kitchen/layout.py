@@ -95,8 +95,6 @@ class Plan:
         width: along x; `depth` along y; `height`.
         items: furniture.
         decor: (kind, wall, u, z, width, height) on the walls.
-        start: robot (x, y, yaw).
-        lamp: light (x, y, z) and its strength.
     """
 
     room: str
@@ -105,8 +103,6 @@ class Plan:
     height: float
     items: tuple[Item, ...]
     decor: tuple[tuple[str, int, float, float, float, float], ...]
-    start: tuple[float, float, float]
-    lamp: tuple[float, float, float, float]
 
 
 @dataclass(slots=True)
@@ -193,20 +189,19 @@ class Draft:
                 return self.add(item, zone_m)
         return None
 
-    def start(self) -> tuple[float, float, float]:
-        """A free place for the robot."""
-        for _ in range(200):
-            x = float(self.rng.uniform(-self.width / 2 + 0.4, self.width / 2 - 0.4))
-            y = float(self.rng.uniform(-self.depth / 2 + 0.4, self.depth / 2 - 0.4))
-            if all(i.rect().distance(x, y) > 0.36 for i in self.items if i.z == 0):
-                return (x, y, float(self.rng.uniform(-np.pi, np.pi)))
-        raise SceneError("the room has no free floor for the robot")
 
-    def lamp(self, height: float) -> tuple[float, float, float, float]:
-        """A lamp under the ceiling and its strength."""
-        x = float(self.rng.uniform(-0.22, 0.22)) * self.width
-        y = float(self.rng.uniform(-0.22, 0.22)) * self.depth
-        return (x, y, height - 0.12, float(self.rng.uniform(0.62, 0.92)))
+def free_place(plan: Plan, rng: np.random.Generator) -> tuple[float, float, float]:
+    """A place (x, y, yaw) on the free floor, for the robot to start from.
+
+    Raises:
+        SceneError: there is none.
+    """
+    for _ in range(200):
+        x = float(rng.uniform(-plan.width / 2 + 0.4, plan.width / 2 - 0.4))
+        y = float(rng.uniform(-plan.depth / 2 + 0.4, plan.depth / 2 - 0.4))
+        if all(i.rect().distance(x, y) > 0.36 for i in plan.items if i.z == 0):
+            return (x, y, float(rng.uniform(-np.pi, np.pi)))
+    raise SceneError("the room has no free floor for the robot")
 
 
 def columns_of(width: float) -> list[tuple[float, float]]:

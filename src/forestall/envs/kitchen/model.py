@@ -1,13 +1,15 @@
 """Builds a whole scene from what a task needs and a seed; the entry is `build_scene`.
 
-Draws the plan (`plans`), builds and compiles it (`rooms`, `objects`, `assembly`), furnishes it
-(`stocking`), and starts over with other random choices when something finds no place.
+Chooses the contents (`contents`), draws the plan (`plans`), builds and compiles it (`rooms`,
+`objects`, `assembly`), furnishes it (`stocking`), changes what a scenario changes (`changes`), and
+starts over with other random choices when something finds no place. The undisturbed scene is made
+first and in the same way whatever the scenario, so that both scenes of a seed match.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -15,6 +17,8 @@ import numpy as np
 from forestall.envs.kitchen import layout, plans
 from forestall.envs.kitchen.assembly import Kit, compile_kit
 from forestall.envs.kitchen.bodies import Bodies
+from forestall.envs.kitchen.changes import Change, change_of, disturb
+from forestall.envs.kitchen.contents import Contents, Thing, contents_of
 from forestall.envs.kitchen.forms import Instance, Rect
 from forestall.envs.kitchen.navigation import Floor, Standing
 from forestall.envs.kitchen.objects import build_thing
@@ -22,11 +26,12 @@ from forestall.envs.kitchen.robot import build_robot
 from forestall.envs.kitchen.rooms import build_room
 from forestall.envs.kitchen.settled import check_settled
 from forestall.envs.kitchen.stocking import OPEN_PLACES, Stocker
-from forestall.envs.kitchen.style import draw_style
+from forestall.envs.kitchen.streams import Streams
+from forestall.envs.kitchen.style import draw_light, draw_style
 from forestall.envs.kitchen.world import HAND_M, KitchenWorld
 from forestall.errors import SceneError
 from forestall.types.facts import category_of, is_instance
-from forestall.types.scene import SceneNeeds
+from forestall.types.scene import AXES, SceneNeeds
 from forestall.vocabulary import Vocabulary
 
 LAYOUTS = 10
@@ -38,23 +43,8 @@ STOCKINGS = 4
 DRAFTS = 60
 """How many floor plans are drawn for one layout."""
 
-_SPARE_CLUTTER = 3
-_NOT_CLUTTER = {
-    "kitchen": frozenset({"Laptop", "RemoteControl"}),
-    "living-room": frozenset(
-        {"Pot", "Pan", "Kettle", "Knife", "Lettuce", "Egg", "Potato", "Bread"}
-    ),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class _Thing:
-    """One movable thing that is built into the scene."""
-
-    name: str
-    category: str
-    states: dict[str, str]
-    made_from: str | None = None
+STARTS = 40
+"""How many other start places are tried."""
 
 
 def build_scene(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> KitchenWorld:
@@ -72,29 +62,41 @@ def build_scene(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Kitchen
     if needs.room not in OPEN_PLACES:
         known = ", ".join(sorted(OPEN_PLACES))
         raise SceneError(f"unknown room {needs.room!r}: known: {known}")
+    base = _canonical(needs.undisturbed or _undisturbed(needs), vocabulary)
     needs = _canonical(needs, vocabulary)
+    if base.room != needs.room:
+        raise SceneError(f"a {base.room} cannot be changed into a {needs.room}")
+    change = change_of(needs, base, lambda n, a: vocabulary.default_states(n)[a])
     failure = ""
     for attempt in range(LAYOUTS):
-        rng = np.random.default_rng(seed if attempt == 0 else [seed, attempt])
-        things, clutter, most = _things(needs, vocabulary, rng)
-        empty = _empty_room(needs, things, vocabulary, rng)
+        streams = Streams(seed, attempt, dict(needs.vary))
+        contents = contents_of(needs, base, vocabulary, streams)
+        empty = _empty_room(needs, base, contents.things, vocabulary, streams)
         start = empty.world.bodies.snapshot()
-        for _ in range(STOCKINGS):
+        for stocking in range(STOCKINGS):
             empty.world.bodies.restore(start)
             try:
-                _stock(empty, needs, vocabulary, clutter, most, rng)
+                stocker = _stock(empty, base, vocabulary, contents, streams, stocking)
+                _disturb(stocker, change, contents, streams, stocking)
+                world = _restarted(empty, streams)
             except SceneError as error:
                 failure = str(error)
                 continue
-            empty.world.freeze(_instances(empty, things))
-            return empty.world
+            world.freeze(_instances(world, empty.fixtures, contents.things))
+            return world
     raise SceneError(f"no {needs.room} of seed {seed} has room for this scene: {failure}")
+
+
+def _undisturbed(needs: SceneNeeds) -> SceneNeeds:
+    return replace(needs, vary=(), more_clutter=0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Empty:
     world: KitchenWorld
     fixtures: tuple[str, ...]
+    plan: layout.Plan
+    floor: Floor
 
 
 def _canonical(needs: SceneNeeds, vocabulary: Vocabulary) -> SceneNeeds:
@@ -124,7 +126,13 @@ def _canonical(needs: SceneNeeds, vocabulary: Vocabulary) -> SceneNeeds:
     low, high = needs.clutter
     if not 0 <= low <= high:
         raise SceneError(f"clutter must be a smallest and a largest number, got {low} and {high}")
-    return SceneNeeds(needs.room, needs.objects, fixtures, needs.clutter)
+    for axis, number in needs.vary:
+        if axis not in AXES or number < 0:
+            known = ", ".join(AXES)
+            raise SceneError(f"cannot vary {axis!r} to {number}: known are {known}, numbers from 0")
+    if needs.more_clutter < 0:
+        raise SceneError(f"more_clutter cannot be {needs.more_clutter}")
+    return replace(needs, fixtures=fixtures)
 
 
 def _checked(
@@ -139,92 +147,54 @@ def _checked(
             raise SceneError(f"{attribute} of {name} cannot be {value!r}: known: {known}")
 
 
-def _things(
-    needs: SceneNeeds, vocabulary: Vocabulary, rng: np.random.Generator
-) -> tuple[list[_Thing], list[str], int]:
-    """Everything movable that is built, the clutter among it, and how much of it is wanted."""
-    things = [
-        _Thing(n.id, n.category, vocabulary.default_states(n.category) | dict(n.states))
-        for n in needs.objects
-    ]
-    names = [n.id for n in needs.objects]
-    taken = {n.category for n in needs.objects}
-    taken |= {c for n in taken for c in (vocabulary[n].slices_into, vocabulary[n].cracks_into) if c}
-    options = [
-        name
-        for name, c in sorted(vocabulary.categories.items())
-        if c.pickupable
-        and not c.fixture
-        and name not in taken
-        and name not in _NOT_CLUTTER[needs.room]
-        and ("sliced", "sliced") not in c.defaults
-    ]
-    low, high = needs.clutter
-    most = int(rng.integers(low, high + 1))
-    clutter: list[str] = []
-    numbers: dict[str, int] = {}
-    if options and most:
-        order = [options[int(i)] for i in rng.permutation(len(options))]
-        for k in range(most + min(_SPARE_CLUTTER, len(options))):
-            category = order[k % len(order)]
-            numbers[category] = numbers.get(category, 0) + 1
-            name = f"{category}-{numbers[category]}"
-            clutter.append(name)
-            things.append(_Thing(name, category, vocabulary.default_states(category)))
-    names += clutter
-    return things + _prepared(things, names, vocabulary), clutter, most
-
-
-def _prepared(
-    things: Sequence[_Thing], names: Sequence[str], vocabulary: Vocabulary
-) -> list[_Thing]:
-    """Slices and cracked eggs that wait for their turn."""
-    used = set(names)
-    made: list[_Thing] = []
-    for thing in things:
-        category = vocabulary[thing.category]
-        parts = [category.slices_into] * category.slices if category.slices_into else []
-        parts += [category.cracks_into] if category.cracks_into else []
-        for part in parts:
-            number = 1
-            while f"{part}-{number}" in used:
-                number += 1
-            name = f"{part}-{number}"
-            used.add(name)
-            made.append(_Thing(name, part, vocabulary.default_states(part), thing.name))
-    return made
-
-
 def _empty_room(
-    needs: SceneNeeds, things: Sequence[_Thing], vocabulary: Vocabulary, rng: np.random.Generator
+    needs: SceneNeeds,
+    base: SceneNeeds,
+    things: Sequence[Thing],
+    vocabulary: Vocabulary,
+    streams: Streams,
 ) -> _Empty:
-    plan = _drawn(needs.room, rng)
-    kit = Kit(mujoco.MjSpec(), rng)
-    forms = build_room(kit, plan, draw_style(rng))
+    plan, start = _drawn(needs.room, streams)
+    colours = streams("colours")
+    kit = Kit(mujoco.MjSpec(), colours)
+    forms = build_room(kit, plan, draw_style(colours), draw_light(streams("light")))
     fixtures = tuple(sorted(forms))
     states = {name: vocabulary.default_states(name) for name in fixtures}
-    for name, attribute, value in needs.fixtures:
+    for name, attribute, value in (*needs.fixtures, *base.fixtures):
         if name not in states:
             raise SceneError(f"the {needs.room} has no {name}")
-        states[name][attribute] = value
+        if (name, attribute, value) in base.fixtures:
+            states[name][attribute] = value
     for thing in things:
+        kit.rng = streams("colours", thing.looks)
         forms[thing.name] = build_thing(kit, thing.name, vocabulary[thing.category])
         states[thing.name] = thing.states
     build_robot(kit, HAND_M)
     bodies = Bodies(compile_kit(kit), forms, states)
     area = Rect(-plan.width / 2, -plan.depth / 2, plan.width / 2, plan.depth / 2)
     floor = Floor(area, tuple(item.rect() for item in plan.items if item.z == 0))
-    world = KitchenWorld(bodies, floor, Standing(*plan.start), _decks(plan))
-    return _Empty(world, fixtures)
+    world = KitchenWorld(bodies, floor, start, _decks(plan))
+    return _Empty(world, fixtures, plan, floor)
 
 
-def _drawn(room: str, rng: np.random.Generator) -> layout.Plan:
+def _drawn(room: str, streams: Streams) -> tuple[layout.Plan, Standing]:
+    """A floor plan and the undisturbed start in it; other furniture stands in the same room."""
     draw = plans.kitchen if room == "kitchen" else plans.living_room
-    for _ in range(DRAFTS):
+    usual = streams.without("furniture").without("start")
+    for draft in range(DRAFTS):
         try:
-            return draw(rng)
+            plan = draw(usual("layout", draft), usual("furniture", draft))
+            start = Standing(*layout.free_place(plan, usual("start")))
         except SceneError:
             continue
+        if not streams.varied("furniture"):
+            return plan, start
+        for again in range(DRAFTS):
+            try:
+                plan = draw(streams("layout", draft), streams("furniture", draft, again))
+                return plan, Standing(*layout.free_place(plan, usual("start")))
+            except SceneError:
+                continue
     raise SceneError(f"no floor plan for a {room} was found")
 
 
@@ -241,29 +211,61 @@ def _decks(plan: layout.Plan) -> Mapping[str, str]:
 
 def _stock(
     empty: _Empty,
-    needs: SceneNeeds,
+    base: SceneNeeds,
     vocabulary: Vocabulary,
-    clutter: Sequence[str],
-    most: int,
-    rng: np.random.Generator,
-) -> None:
+    contents: Contents,
+    streams: Streams,
+    stocking: int,
+) -> Stocker:
+    """Furnish the undisturbed scene."""
     world = empty.world
-    stocker = Stocker(world, vocabulary, needs.room, empty.fixtures, rng)
-    stocker.put_needed(needs.objects)
-    placed = stocker.put_clutter(clutter, most)
-    if len(placed) < needs.clutter[0]:
-        raise SceneError(f"only {len(placed)} of {needs.clutter[0]} further objects found a place")
-    stocker.check(needs.objects)
+    stocker = Stocker(
+        world, vocabulary, base.room, empty.fixtures, lambda n: streams("place", stocking, n)
+    )
+    stocker.put_needed(base.objects)
+    placed = stocker.put_clutter(contents.clutter.names, contents.clutter.most)
+    if len(placed) < base.clutter[0]:
+        raise SceneError(f"only {len(placed)} of {base.clutter[0]} further objects found a place")
+    stocker.check(base.objects)
     problems = check_settled(world)
     if problems:
         raise SceneError(problems[0])
+    return stocker
 
 
-def _instances(empty: _Empty, things: Sequence[_Thing]) -> tuple[Instance, ...]:
-    bodies = empty.world.bodies
+def _disturb(
+    stocker: Stocker, change: Change, contents: Contents, streams: Streams, stocking: int
+) -> None:
+    """Turn the undisturbed scene into the scenario's."""
+    same_clutter = contents.other is None and not contents.more.most
+    if not (change.gone or change.put or change.states) and same_clutter:
+        return
+
+    def draw(axis: str, again: int) -> Callable[[str], np.random.Generator]:
+        return lambda name: streams(axis, stocking, "changed", again, name)
+
+    disturb(stocker, change, contents, draw)
+
+
+def _restarted(empty: _Empty, streams: Streams) -> KitchenWorld:
+    """The world with the robot at another start, from where it gets everywhere, if one is asked."""
+    world = empty.world
+    if not streams.varied("start"):
+        return world
+    for again in range(STARTS):
+        start = Standing(*layout.free_place(empty.plan, streams("start", again)))
+        if world.connected(start, world.standing):
+            return KitchenWorld(world.bodies, empty.floor, start, _decks(empty.plan))
+    raise SceneError("the robot finds no other place to start from")
+
+
+def _instances(
+    world: KitchenWorld, fixtures: Sequence[str], things: Sequence[Thing]
+) -> tuple[Instance, ...]:
+    bodies = world.bodies
     found = [
         Instance(name, category_of(name), None, tuple(sorted(bodies.states[name].items())))
-        for name in empty.fixtures
+        for name in fixtures
     ]
     for thing in things:
         parent = bodies.parents.get(thing.name)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -61,21 +63,7 @@ class Floor:
 
     def connected(self, a: tuple[float, float], b: tuple[float, float]) -> bool:
         """Whether the robot can get from one place to another."""
-        xs = np.arange(self.area.x0, self.area.x1, _CELL_M)
-        ys = np.arange(self.area.y0, self.area.y1, _CELL_M)
-        x, y = np.meshgrid(xs, ys, indexing="ij")
-        r = ROBOT_RADIUS_M - 0.03
-        ok = (
-            (x >= self.area.x0 + r)
-            & (x <= self.area.x1 - r)
-            & (y >= self.area.y0 + r)
-            & (y <= self.area.y1 - r)
-        )
-        for o in self.obstacles:
-            dx = np.maximum(np.maximum(o.x0 - x, x - o.x1), 0)
-            dy = np.maximum(np.maximum(o.y0 - y, y - o.y1), 0)
-            ok &= np.hypot(dx, dy) >= r
-        labels = ndimage.label(ok)[0]
+        labels = _joined(self)
         cells = [
             (round((p[0] - self.area.x0) / _CELL_M), round((p[1] - self.area.y0) / _CELL_M))
             for p in (a, b)
@@ -84,6 +72,22 @@ class Floor:
         clipped = [(min(max(i, 0), shape[0] - 1), min(max(j, 0), shape[1] - 1)) for i, j in cells]
         one, two = (int(labels[c]) for c in clipped)
         return one == two and one > 0
+
+
+@lru_cache(maxsize=8)
+def _joined(floor: Floor) -> Any:
+    """Label of the connected part of the floor for every cell, 0 where the robot cannot be."""
+    area = floor.area
+    xs = np.arange(area.x0, area.x1, _CELL_M)
+    ys = np.arange(area.y0, area.y1, _CELL_M)
+    x, y = np.meshgrid(xs, ys, indexing="ij")
+    r = ROBOT_RADIUS_M - 0.03
+    ok = (x >= area.x0 + r) & (x <= area.x1 - r) & (y >= area.y0 + r) & (y <= area.y1 - r)
+    for o in floor.obstacles:
+        dx = np.maximum(np.maximum(o.x0 - x, x - o.x1), 0)
+        dy = np.maximum(np.maximum(o.y0 - y, y - o.y1), 0)
+        ok &= np.hypot(dx, dy) >= r
+    return ndimage.label(ok)[0]
 
 
 def wrapped(angle_rad: float) -> float:
@@ -106,11 +110,9 @@ def before(furniture: Pose, stance: Stance, target_x: float) -> list[tuple[float
             cost = 1.3 * abs(float(distance) - stance.distance_m) + abs(off) + 0.01 * (off > 0)
             options.append((cost, target_x + float(aside), stance.front_m + float(distance)))
     options.sort()
-    places = []
-    for _, x, y in options:
-        at = furniture @ np.array([x, y, 0.0, 1.0])
-        places.append((float(at[0]), float(at[1])))
-    return places
+    _, x, y = np.array(options).T
+    at = furniture[:2, :2] @ np.stack((x, y)) + furniture[:2, 3:]
+    return [(px, py) for px, py in at.T.tolist()]
 
 
 def around(x: float, y: float, near: tuple[float, float]) -> list[tuple[float, float]]:

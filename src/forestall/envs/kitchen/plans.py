@@ -1,6 +1,7 @@
 """Draws floor plans from a seed: kitchens with counters along one to three walls, living rooms.
 
-Called by `model`; uses `layout`.
+Called by `model`; uses `layout`. The built-in part and the free-standing furniture have a random
+stream each, so that the furniture can be drawn anew in the same room.
 """
 
 from __future__ import annotations
@@ -39,8 +40,12 @@ class _Run:
     modules: tuple[tuple[str, float], ...]
 
 
-def kitchen(rng: np.random.Generator) -> Plan:
+def kitchen(rng: np.random.Generator, places: np.random.Generator) -> Plan:
     """Draw a kitchen.
+
+    Args:
+        rng: the room, its counters and appliances, and every size.
+        places: where the furniture stands that is not built in.
 
     Raises:
         SceneError: this draw does not work out.
@@ -56,27 +61,20 @@ def kitchen(rng: np.random.Generator) -> Plan:
     used = {r.wall for r in runs}
     free = [w for w in range(4) if w not in used]
     size = (float(rng.uniform(1.15, 1.5)), float(rng.uniform(0.75, 0.9)))
+    shelf_size = (float(rng.uniform(0.7, 0.9)), 0.30)
+    bin_size = (float(rng.uniform(0.28, 0.33)), float(rng.uniform(0.28, 0.33)))
+    draft.rng = places
     table = draft.settle("table", draft.name("DiningTable"), size, free, gap=0.02)
     if table is None:
         raise SceneError("no room for the dining table")
     _chairs(draft, table)
     every = [0, 1, 2, 3]
-    shelf = draft.settle("shelf", draft.name("Shelf"), (float(rng.uniform(0.7, 0.9)), 0.30), every)
-    bin_size = (float(rng.uniform(0.28, 0.33)), float(rng.uniform(0.28, 0.33)))
+    shelf = draft.settle("shelf", draft.name("Shelf"), shelf_size, every)
     can = draft.settle("garbage_can", draft.name("GarbageCan"), bin_size, every, 0.75, gap=0.03)
     if shelf is None or can is None:
         raise SceneError("no room for the shelf and the garbage can")
     _decorate(draft, free)
-    return Plan(
-        "kitchen",
-        width,
-        depth,
-        2.55,
-        tuple(draft.items),
-        tuple(draft.decor),
-        draft.start(),
-        draft.lamp(2.55),
-    )
+    return Plan("kitchen", width, depth, 2.55, tuple(draft.items), tuple(draft.decor))
 
 
 def _runs(shape: str, rng: np.random.Generator) -> tuple[float, float, list[_Run]]:
@@ -329,8 +327,12 @@ def _decorate(draft: Draft, walls: list[int]) -> None:
         draft.decor.append(("picture", wall, u, float(rng.uniform(1.45, 1.65)), *size))
 
 
-def living_room(rng: np.random.Generator) -> Plan:
+def living_room(rng: np.random.Generator, places: np.random.Generator) -> Plan:
     """Draw a living room.
+
+    Args:
+        rng: the room, television and sofa, and every size.
+        places: where the other furniture stands.
 
     Raises:
         SceneError: this draw does not work out.
@@ -357,26 +359,19 @@ def living_room(rng: np.random.Generator) -> Plan:
     draft.add(sofa, 0.0)
     sides = [(wall + 1) % 4, (wall + 3) % 4]
     size = (float(rng.uniform(1.15, 1.5)), float(rng.uniform(0.75, 0.9)))
+    shelf_size = (float(rng.uniform(0.75, 1.0)), 0.30)
+    rug = (float(rng.uniform(1.7, 2.2)), float(rng.uniform(1.2, 1.5)))
+    draft.rng = places
     table = draft.settle("table", draft.name("DiningTable"), size, sides, gap=0.02)
     if table is None:
         raise SceneError("no room for the dining table")
     _chairs(draft, table)
     every = [0, 1, 2, 3]
-    shelf = draft.settle("shelf", draft.name("Shelf"), (float(rng.uniform(0.75, 1.0)), 0.30), every)
+    shelf = draft.settle("shelf", draft.name("Shelf"), shelf_size, every)
     lamp = draft.settle("floor_lamp", draft.name("FloorLamp"), (0.36, 0.36), every, 0.75, gap=0.03)
     if shelf is None or lamp is None:
         raise SceneError("no room for the shelf and the floor lamp")
-    rug = (float(rng.uniform(1.7, 2.2)), float(rng.uniform(1.2, 1.5)))
     draft.decor.append(("rug", wall, u, float(draft.length(wall + 1) / 2), *rug))
     _decorate(draft, sides)
     draft.decor.append(("window", (wall + 2) % 4, -u, 1.15, 1.5, 0.95))
-    return Plan(
-        "living-room",
-        width,
-        depth,
-        2.6,
-        tuple(draft.items),
-        tuple(draft.decor),
-        draft.start(),
-        draft.lamp(2.6),
-    )
+    return Plan("living-room", width, depth, 2.6, tuple(draft.items), tuple(draft.decor))

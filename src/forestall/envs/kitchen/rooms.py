@@ -13,7 +13,7 @@ from forestall.envs.kitchen.crockery import darker
 from forestall.envs.kitchen.forms import FLOOR, Form, Rect, Region
 from forestall.envs.kitchen.furniture import Forms
 from forestall.envs.kitchen.layout import Item, Plan
-from forestall.envs.kitchen.style import STEEL, Style
+from forestall.envs.kitchen.style import STEEL, Light, Style
 
 _WALL_M = 0.06
 
@@ -36,7 +36,7 @@ _BUILDERS: Mapping[str, Callable[[Kit, Item, Style], Forms]] = {
 }
 
 
-def build_room(kit: Kit, plan: Plan, style: Style) -> Forms:
+def build_room(kit: Kit, plan: Plan, style: Style, light: Light) -> Forms:
     """Add a room; the forms of its fixtures by instance name."""
     _shell(kit, plan, style)
     for kind, wall, u, z, w, h in plan.decor:
@@ -47,7 +47,7 @@ def build_room(kit: Kit, plan: Plan, style: Style) -> Forms:
     half = Rect(-plan.width / 2, -plan.depth / 2, plan.width / 2, plan.depth / 2)
     region = Region(FLOOR, FLOOR, half.grown(-0.02), 0.0)
     forms[FLOOR] = Form(half, 0.0, regions=(region,))
-    _light(kit, plan)
+    _light(kit, plan, light)
     return forms
 
 
@@ -70,9 +70,8 @@ def _shell(kit: Kit, plan: Plan, style: Style) -> None:
         shell.box((0, side * (d / 2 - 0.004), 0.04), (w, 0.008, 0.08), skirt, solid=False)
 
 
-def _light(kit: Kit, plan: Plan) -> None:
-    x, y, z, strength = plan.lamp
-    warm = float(kit.rng.uniform(0.86, 1.0))
+def _light(kit: Kit, plan: Plan, light: Light) -> None:
+    x, y, z = light.aside[0] * plan.width, light.aside[1] * plan.depth, plan.height - 0.12
     bulb = kit.furniture(None, "lamp", (x, y, z, 0))
     bulb.cylinder((0, 0, 0.095), 0.17, 0.03, (0.97, 0.96, 0.92, 1), solid=False)
     kit.spec.worldbody.add_light(
@@ -80,16 +79,15 @@ def _light(kit: Kit, plan: Plan) -> None:
         type=mujoco.mjtLightType.mjLIGHT_POINT,
         pos=[x, y, z],
         dir=[0, 0, -1],
-        diffuse=[strength, strength * (0.5 + warm / 2), strength * warm],
+        diffuse=[light.strength * s for s in (1.0, 0.5 + light.warm / 2, light.warm)],
         castshadow=True,
     )
-    fill = 0.14 * float(kit.rng.uniform(0.7, 1.3))
     kit.spec.worldbody.add_light(
         name="window",
         type=mujoco.mjtLightType.mjLIGHT_POINT,
         pos=[-0.35 * plan.width * float(np.sign(x or 1.0)), -0.6 * y, 1.7],
         dir=[0, 0, -1],
-        diffuse=[fill, fill, fill * 1.1],
+        diffuse=[light.fill, light.fill, light.fill * 1.1],
         castshadow=False,
     )
 

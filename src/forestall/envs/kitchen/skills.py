@@ -165,6 +165,9 @@ def _need_takes(robot: Robot, name: str, place: str) -> None:
     robot.need_accessible(place)
     if home.is_shut(place):
         raise RefusalError(f"{place} is closed")
+    device = home.category(place).device
+    if device is not None and device.shut_while_on and home.state(place, "toggled") == "on":
+        raise RefusalError(f"{place} takes nothing while it is on")
 
 
 def open_obj(robot: Robot, target: str) -> str:

@@ -1,4 +1,4 @@
-"""Colours and surfaces of a room, drawn once from the scene's seed; read by the furniture."""
+"""Colours, surfaces and light of a room, drawn once from the scene's seed; read by its builders."""
 
 from __future__ import annotations
 
@@ -116,4 +116,31 @@ def draw_style(rng: np.random.Generator) -> Style:
         cloth=pick(_CLOTHS),
         rug=pick(_CLOTHS),
         handle=DARK if rng.uniform() < 0.4 else STEEL,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """How a room is lit.
+
+    Args:
+        aside: where the lamp hangs, as shares of the room's width and depth from its middle.
+        strength: of the lamp.
+        warm: 1 for white, less for yellow.
+        fill: strength of the light from the window.
+    """
+
+    aside: tuple[float, float]
+    strength: float
+    warm: float
+    fill: float
+
+
+def draw_light(rng: np.random.Generator) -> Light:
+    """A seeded light."""
+    return Light(
+        aside=(float(rng.uniform(-0.22, 0.22)), float(rng.uniform(-0.22, 0.22))),
+        strength=float(rng.uniform(0.62, 0.92)),
+        warm=float(rng.uniform(0.86, 1.0)),
+        fill=0.14 * float(rng.uniform(0.7, 1.3)),
     )

@@ -5,6 +5,14 @@
 """
 
 from forestall.envs.kitchen.rendering.appearance import TEXTURES, Appearance
-from forestall.envs.kitchen.rendering.factory import RENDERERS, make_renderer
+from forestall.envs.kitchen.rendering.factory import RENDERERS, make_remembering, make_renderer
+from forestall.envs.kitchen.rendering.memory import FrameMemory
 
-__all__ = ["RENDERERS", "TEXTURES", "Appearance", "make_renderer"]
+__all__ = [
+    "RENDERERS",
+    "TEXTURES",
+    "Appearance",
+    "FrameMemory",
+    "make_remembering",
+    "make_renderer",
+]

@@ -17,7 +17,29 @@ from forestall.types.observation import Intrinsics
 if TYPE_CHECKING:
     import mujoco
 
+    from forestall.envs.kitchen.rendering.memory import FrameMemory
+
 RENDERERS = ("auto", "embree", "gl", "rays")
+
+
+def make_remembering(
+    name: str,
+    model: mujoco.MjModel,
+    appearance: Appearance,
+    intrinsics: Intrinsics,
+    frames: FrameMemory,
+) -> Renderer:
+    """As `make_renderer`, for one that draws nothing twice."""
+    from forestall.envs.kitchen.rendering.remembered import RememberingRenderer
+
+    return RememberingRenderer(
+        frames,
+        lambda: make_renderer(name, model, appearance, intrinsics),
+        name,
+        model,
+        appearance,
+        intrinsics,
+    )
 
 
 def make_renderer(

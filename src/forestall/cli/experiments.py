@@ -1,0 +1,153 @@
+"""`forestall bench proactive | detection | ablation | all | report`: the paper's experiments."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+if TYPE_CHECKING:
+    from forestall.benchmark.tables import Table
+
+MAIN_TABLES = ("strategies", "detectors-robofail", "ablation", "paper")
+"""Printed; all of them are in the folder."""
+
+Flag = Annotated[bool, Parameter(negative="")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Options:
+    """What every experiment can be told.
+
+    Args:
+        split: development (to look at and to tune on) or test (to report).
+        seeds: how many scenes each scenario and task gets.
+        jobs: how many episodes at once; one for each core by default.
+        limit: at most so many cases of each set, from all tasks in turn; for a first look.
+        out: folder of the results; what is finished in it is not run again.
+        engine: local (processes) or ray.
+        address: of a running Ray cluster; a local one is started by default.
+        memory: a demonstration file; the ready-made one of each task by default.
+        states: where object states come from: learned, clip or oracle.
+        feature: what a node's feature encodes: text, parts or image.
+        encoder: of texts: hashed-words, two-tower, sentence.
+        pages: which episodes get a page of their own (1.5 MB each): all, telling (the proactive
+            runs of failing cases, and those with a false alarm) or none.
+        as_json: print the summary as JSON instead of tables.
+        quiet: no progress on standard error.
+    """
+
+    split: str = "test"
+    seeds: int = 1
+    jobs: int | None = None
+    limit: int | None = None
+    out: Path | None = None
+    engine: str = "local"
+    address: str | None = None
+    memory: Path | None = None
+    states: str = "learned"
+    feature: str = "parts"
+    encoder: str = "hashed-words"
+    pages: str = "telling"
+    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
+    quiet: Flag = False
+
+
+DEFAULTS = Options()
+
+
+def proactive(*, options: Options = DEFAULTS) -> int:
+    """The paper's Table 1: success and time of none, post-hoc, online and proactive."""
+    return _experiment("proactive", options)
+
+
+def detection(*, options: Options = DEFAULTS) -> int:
+    """The paper's Fig. 8a: what detectors find, how early, and how often they cry wolf."""
+    return _experiment("detection", options)
+
+
+def ablation(*, options: Options = DEFAULTS) -> int:
+    """The paper's Table 2: the score without its parts, replanning without reasoning."""
+    return _experiment("ablation", options)
+
+
+def everything(*, options: Options = DEFAULTS) -> int:
+    """All of them, on one set of episodes."""
+    return _experiment("all", options)
+
+
+def report(
+    folder: Path,
+    /,
+    *,
+    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+) -> int:
+    """Make the tables, figures and page of a folder of results again; nothing is run.
+
+    Args:
+        folder: where an experiment left its results.
+        as_json: print the summary as JSON instead of tables.
+    """
+    from forestall.experiments.results import present
+
+    return _show(*present(folder), folder, as_json)
+
+
+def register(bench: App) -> None:
+    """Add the experiments to `forestall bench`."""
+    for command in (proactive, detection, ablation, report):
+        bench.command(command)
+    bench.command(everything, name="all")
+
+
+def _experiment(name: str, options: Options) -> int:
+    from forestall.cli.progress import bar
+    from forestall.experiments.conduct import Plan, conduct
+    from forestall.experiments.results import present
+    from forestall.experiments.runs import Settings
+
+    plan = Plan(
+        name,
+        options.split,
+        options.seeds,
+        options.limit,
+        options.jobs if options.jobs is not None else os.cpu_count() or 1,
+        options.engine,
+        options.address,
+        Settings(
+            states=options.states,
+            encoder=options.encoder,
+            feature=options.feature,
+            memory=None if options.memory is None else str(options.memory),
+            pages=options.pages,
+        ),
+    )
+    out = options.out or Path("runs") / f"{name}-{options.split}"
+    with bar("running", quiet=options.quiet or options.as_json) as feed:
+        runs = conduct(plan, out, feed)
+    return _show(*present(out, runs), out, options.as_json)
+
+
+def _show(summary: dict[str, Any], tables: Sequence[Table], folder: Path, as_json: bool) -> int:
+    if as_json:
+        print(json.dumps(summary, indent=2))
+        return 0
+    from rich.console import Console
+
+    from forestall.cli.listing import print_table
+
+    console = Console(highlight=False)
+    for table in tables:
+        if table.name in MAIN_TABLES:
+            console.print(f"\n[bold]{table.title}[/]")
+            print_table(table.header, list(table.rows))
+    for line in summary["orderings"]:
+        console.print(f"{line['verdict']}: {line['text']}", soft_wrap=True, markup=False)
+    print(folder / "index.html")
+    return 0

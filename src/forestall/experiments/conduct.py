@@ -1,0 +1,164 @@
+"""Conducts an experiment: demonstrations, episodes, then tables, figures and the page.
+
+Calls: command line → here → engines → worker → build. What is in the folder is not run again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from forestall.benchmark.rows import EpisodeRow
+from forestall.demonstrations import ready_made
+from forestall.errors import InputError, UnknownNameError
+from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
+from forestall.experiments.folder import About, ResultsFolder
+from forestall.experiments.runs import PAGES, Run, Settings, by_scene, runs_for
+from forestall.experiments.worker import Work, broken_row, run_one
+from forestall.memory.store import open_store
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to do and how.
+
+    Args:
+        experiment: one of `runs.EXPERIMENTS`.
+        split: "development" or "test".
+        rounds: how many scenes each scenario gets.
+        limit: cases of each set at most.
+        workers: how many episodes at once.
+        engine: "local" or "ray".
+        address: of a Ray cluster.
+        settings: what is the same for every episode.
+    """
+
+    experiment: str
+    split: str = "test"
+    rounds: int = 1
+    limit: int | None = None
+    workers: int = 1
+    engine: str = "local"
+    address: str | None = None
+    settings: Settings = field(default_factory=Settings)
+
+
+def conduct(
+    plan: Plan,
+    out: Path,
+    progress: Progress,
+    compute: Callable[[Work], dict[str, Any]] = run_one,
+    prepare: Callable[[Sequence[Run], Plan, Progress], None] | None = None,
+) -> list[EpisodeRow]:
+    """Run what is missing; every row of the experiment in the order of its runs.
+
+    Args:
+        plan: what to do.
+        out: folder of the results.
+        progress: told (done, total, what).
+        compute: makes a row; called in the workers.
+        prepare: called once before, by default to record the demonstrations that are needed.
+
+    Raises:
+        InputError: something that does not fit, each with what would be valid.
+    """
+    runs = runs_for(plan.experiment, plan.split, plan.rounds, plan.limit)
+    if plan.workers < 1:
+        raise InputError(f"--jobs {plan.workers}: at least 1 is needed")
+    if plan.settings.pages not in PAGES:
+        raise UnknownNameError("pages", plan.settings.pages, PAGES)
+    folder = ResultsFolder(out)
+    rows = folder.open(About.now(plan.split, plan.rounds, plan.settings))
+    todo = [r for r in runs if r.key not in rows]
+    if todo:
+        started, before = time.monotonic(), len(runs) - len(todo)
+        (prepare or _demonstrations)(todo, plan, progress)
+        progress(before, len(runs), "episodes")
+        for done, row in enumerate(_computed(todo, rows, folder, plan, compute), before + 1):
+            progress(done, len(runs), row.scenario or row.task)
+        seconds = time.monotonic() - started
+        folder.note_effort(len(todo), seconds, plan.workers, plan.engine)
+    return [rows[r.key] for r in runs]
+
+
+def _demonstrations(runs: Sequence[Run], plan: Plan, progress: Progress) -> None:
+    if plan.settings.memory is not None:
+        with open_store(plan.settings.memory) as store:
+            store.required()
+        return
+    for task in sorted({r.case.task for r in runs}):
+        ready_made(
+            task,
+            plan.settings.states,
+            progress=progress,
+            workers=plan.workers,
+            feature=plan.settings.feature,
+            image_encoder=plan.settings.image_encoder,
+            captioner=plan.settings.captioner,
+        )
+
+
+def _computed(
+    todo: Sequence[Run],
+    rows: dict[str, EpisodeRow],
+    folder: ResultsFolder,
+    plan: Plan,
+    compute: Callable[[Work], dict[str, Any]],
+) -> Iterator[EpisodeRow]:
+    """Every missing row, written and put among `rows`, as they come."""
+    where = str(folder.path)
+    groups = [[Work(r, plan.settings, where) for r in group] for group in by_scene(todo)]
+
+    def spared(work: Work) -> dict[str, Any] | None:
+        row = implied(work.run, rows)
+        return None if row is None else row.to_json()
+
+    lanes = make_lanes(plan.engine, min(plan.workers, len(groups)), plan.address)
+    with folder.writing() as lines:
+        for work, answer in computed(groups, lanes, compute, spared):
+            row = (
+                broken_row(work.run, str(answer))
+                if isinstance(answer, WorkerDiedError)
+                else EpisodeRow.from_json(answer)
+            )
+            rows[work.run.key] = row
+            folder.add(lines, row)
+            yield row
+
+
+def implied(run: Run, rows: dict[str, EpisodeRow]) -> EpisodeRow | None:
+    """The row of a run that must be the unmonitored one, None where it has to be run.
+
+    A baseline detector that stays at or above its threshold at every boundary of the unmonitored
+    run never interrupts, so that its own run is the same, step by step. Runs in which the robot
+    looked twice anywhere are not spared: the second look was the paper's detector's wish.
+    """
+    if run.strategy != "proactive" or run.without is not None or run.detector == "scene-graph":
+        return None
+    watched = rows.get(Run(run.case, "watch").key)
+    if watched is None or watched.error or any(j.looks > 1 for j in watched.judged):
+        return None
+    scores = [j.scores.get(run.detector) for j in watched.judged]
+    if any(s is not None and s < run.threshold for s in scores):
+        return None
+    return replace(
+        watched,
+        strategy=run.strategy,
+        detector=run.detector,
+        threshold=run.threshold,
+        judged=tuple(
+            replace(j, score=s, decision="proceed", confirmed=False, cause="", scores={})
+            for j, s in zip(watched.judged, scores, strict=True)
+        ),
+        compute_s={},
+        reasoning_s=0.0,
+        implied=True,
+    )
+
+
+__all__ = ["Plan", "conduct", "implied"]

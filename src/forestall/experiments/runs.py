@@ -1,0 +1,127 @@
+"""Which episodes each experiment consists of.
+
+Called by `conduct`; reads `benchmark.cases`. The unmonitored run of every case is "watch": all
+detectors judge it and none interrupts it, so that they are compared on the same observations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from forestall.benchmark.cases import CASE_SETS, UNDISTURBED, Case, cases
+from forestall.benchmark.rows import row_key
+from forestall.errors import InputError, UnknownNameError
+from forestall.parts import STATES, THRESHOLD
+
+EXPERIMENTS = ("proactive", "detection", "ablation", "all")
+
+THRESHOLDS = (0.90, 0.85, 0.80)
+"""The paper's (Sec. 4 "Analysis of Potential Failure Detection")."""
+
+PAGES = ("all", "telling", "none")
+"""Telling are the proactive runs of failing cases, and those in which it raised a false alarm."""
+
+BASELINES = ("objects", "caption", "image")
+
+PAPER_DETECTOR = "scene-graph"
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What is the same for every episode of an experiment.
+
+    Args:
+        states: where object states come from.
+        encoder: of texts.
+        feature: what a node's feature encodes.
+        image_encoder: of whole pictures.
+        captioner: of whole pictures.
+        memory: a demonstration file; None for the ready-made one of each task.
+        pages: which episodes get a page of their own, one of `PAGES`.
+    """
+
+    states: str = STATES
+    encoder: str = "hashed-words"
+    feature: str = "parts"
+    image_encoder: str = "two-tower"
+    captioner: str = "listing"
+    memory: str | None = None
+    pages: str = "telling"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Run:
+    """One episode: a case and who watches over it."""
+
+    case: Case
+    strategy: str
+    detector: str = PAPER_DETECTOR
+    threshold: float = THRESHOLD
+    without: str | None = None
+
+    @property
+    def key(self) -> str:
+        """As `EpisodeRow.key`."""
+        return row_key(self.case, self.strategy, self.detector, self.threshold, self.without)
+
+    @property
+    def scene(self) -> tuple[str, int]:
+        """Runs of one scene see much the same and are done by one worker."""
+        return self.case.task, self.case.seed
+
+
+def runs_for(
+    experiment: str, split: str, rounds: int = 1, limit: int | None = None
+) -> tuple[Run, ...]:
+    """The episodes of an experiment, each once, the unmonitored run of a case first.
+
+    Args:
+        experiment: one of `EXPERIMENTS`.
+        split: "development" or "test".
+        rounds: how many scenes each scenario gets.
+        limit: cases of each set at most, taken from all tasks in turn; all by default.
+
+    Raises:
+        UnknownNameError: no such experiment or split.
+        InputError: a limit below 1.
+    """
+    if experiment not in EXPERIMENTS:
+        raise UnknownNameError("experiment", experiment, EXPERIMENTS)
+    if limit is not None and limit < 1:
+        raise InputError(f"limit {limit}: at least 1 case of each set is needed")
+    sets = {of: _limited(cases(of, split, rounds), limit) for of in CASE_SETS}
+    runs = [Run(c, "watch") for of in CASE_SETS for c in sets[of]]
+    if experiment in ("proactive", "all"):
+        for of in ("irreversible", "robofail"):
+            for strategy in ("proactive", "online", "post-hoc"):
+                runs += [Run(c, strategy) for c in sets[of]]
+        runs += [Run(c, "proactive") for of in (UNDISTURBED, "harmless") for c in sets[of]]
+    if experiment in ("detection", "all"):
+        for detector in (PAPER_DETECTOR, *BASELINES):
+            for threshold in THRESHOLDS:
+                runs += [Run(c, "proactive", detector, threshold) for c in sets["robofail"]]
+    if experiment in ("ablation", "all"):
+        runs += [Run(c, "proactive") for c in sets["robofail"]]
+        for part in ("reasoning", "validation"):
+            runs += [Run(c, "proactive", without=part) for c in sets["robofail"]]
+    return tuple(dict.fromkeys(runs))
+
+
+def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
+    """Runs grouped by scene, in the order of the first of each; within a scene as they come."""
+    groups: dict[tuple[str, int], list[Run]] = {}
+    for run in runs:
+        groups.setdefault(run.scene, []).append(run)
+    return list(groups.values())
+
+
+def _limited(found: Sequence[Case], limit: int | None) -> Sequence[Case]:
+    if limit is None:
+        return found
+    of_task: dict[str, list[Case]] = {}
+    for case in found:
+        of_task.setdefault(case.task, []).append(case)
+    most = max(map(len, of_task.values()), default=0)
+    in_turn = [several[k] for k in range(most) for several in of_task.values() if k < len(several)]
+    return in_turn[:limit]

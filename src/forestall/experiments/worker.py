@@ -1,0 +1,237 @@
+"""One episode → one row. Called in a worker process by an engine; calls build.
+
+Whatever goes wrong in an episode becomes a row that says so: it counts as a failure and is seen.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from forestall.benchmark.faults import knowable
+from forestall.benchmark.rows import EpisodeRow, Judged
+from forestall.benchmark.truth import TruthTrace
+from forestall.build import Prepared, RunConfig, prepare, run_episode
+from forestall.demonstrations import ready_made
+from forestall.envs.kitchen.rendering import FrameMemory
+from forestall.experiments.runs import Run, Settings
+from forestall.memory.store import open_store
+from forestall.report.derived import alarms, reasoning_s, replans
+from forestall.report.page import write_page
+from forestall.report.record import RunRecorder
+from forestall.types.demonstration import Demonstration
+from forestall.types.episode import BoundaryRecord, EpisodeRecord, SkillStatus
+from forestall.types.verdict import Decision
+
+PAGES = "episodes"
+"""Folder of the episodes' own pages, inside that of an experiment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """A run with all that a worker must know; `folder` is that of the experiment."""
+
+    run: Run
+    settings: Settings
+    folder: str | None = None
+
+    @property
+    def page_folder(self) -> Path | None:
+        """Where the run's own page goes, None where it gets none."""
+        run, pages = self.run, self.settings.pages
+        telling = run == Run(run.case, "proactive")
+        if self.folder is None or pages == "none" or (pages == "telling" and not telling):
+            return None
+        return Path(self.folder) / PAGES / run.key
+
+
+def config_of(run: Run, settings: Settings) -> RunConfig:
+    """The run as `build` wants it."""
+    case = run.case
+    return RunConfig(
+        case.task,
+        case.scenario,
+        run.strategy,
+        case.seed,
+        states=settings.states,
+        encoder=settings.encoder,
+        feature=settings.feature,
+        threshold=run.threshold,
+        keep_observations=False,
+        detector=run.detector,
+        without=run.without,
+        image_encoder=settings.image_encoder,
+        captioner=settings.captioner,
+    )
+
+
+def run_one(work: Work) -> dict[str, Any]:
+    """Run an episode; its row as plain data."""
+    run = work.run
+    prepared = prepare(config_of(run, work.settings))
+    trace = TruthTrace()
+    try:
+        record = _record(work, prepared, trace)
+    except Exception as error:  # noqa: BLE001 - whatever breaks is one failed episode, and is told
+        return broken_row(run, f"{type(error).__name__}: {error}", prepared).to_json()
+    return _row(run, prepared, record, trace).to_json()
+
+
+def broken_row(run: Run, error: str, prepared: Prepared | None = None) -> EpisodeRow:
+    """The row of an episode that did not come to an end."""
+    prepared = prepared or prepare(config_of(run, Settings()))
+    return EpisodeRow(
+        **_identity(run, prepared),
+        success=False,
+        weak_success=False,
+        failures=(error,),
+        harmed=(),
+        harmed_s=None,
+        end="error",
+        error=error,
+        steps=len(prepared.plan),
+        executed=0,
+        refused=0,
+        judged=(),
+        replans=0,
+        planner_calls=0,
+        model_calls=0,
+        simulated_s=0.0,
+        compute_s={},
+    )
+
+
+def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
+    demonstrations, memory = _memory(work.run.case.task, work.settings)
+    listeners = []
+    folder = work.page_folder
+    if folder is not None:
+        listeners.append(
+            RunRecorder(
+                folder,
+                scenario=work.run.case.scenario,
+                strategy=work.run.strategy,
+                page=str(folder / "index.html"),
+            )
+        )
+    record = run_episode(prepared, demonstrations, listeners, memory, trace, _frames())
+    if folder is not None:
+        dull = not work.run.case.failing and record.success and not alarms(record)
+        if work.settings.pages == "telling" and dull:
+            shutil.rmtree(folder)
+        else:
+            write_page(record, folder / "index.html")
+    return record
+
+
+def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace) -> EpisodeRow:
+    judged, last = [], len(record.boundaries) - 1
+    for position, boundary in enumerate(record.boundaries):
+        following = record.boundaries[position + 1] if position < last else None
+        if following is not None and _same(boundary, following):
+            continue  # another look follows, and that one counts
+        moment = trace.moments[position]
+        judged.append(_judged(boundary, record, moment.possible, moment.reachable))
+    broke = record.end.value == "error"
+    return EpisodeRow(
+        **_identity(run, prepared),
+        success=bool(record.success),
+        weak_success=record.weak_success,
+        failures=record.failures,
+        harmed=tuple(text for _, text in record.harmed),
+        harmed_s=min((at for at, _ in record.harmed), default=None),
+        end=record.end.value,
+        error="; ".join(record.failures) if broke else "",
+        steps=len(prepared.plan),
+        executed=len(record.executed),
+        refused=sum(e.outcome.status is not SkillStatus.SUCCEEDED for e in record.executed),
+        judged=tuple(judged),
+        replans=replans(record),
+        planner_calls=sum(b.replan is not None for b in record.boundaries),
+        model_calls=0,
+        simulated_s=record.simulated_s,
+        compute_s=dict(record.compute_s),
+        reasoning_s=reasoning_s(record.compute_s),
+        provenance={
+            k: v
+            for k, v in record.provenance
+            if k in ("config", "demonstrations", "memory", "perception", "versions")
+        },
+    )
+
+
+def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
+    scenario = prepared.scenario
+    moments = (None, None) if scenario is None else scenario.moments(prepared.plan)
+    failing = run.case.failing
+    return {
+        "set": run.case.set,
+        "task": run.case.task,
+        "scenario": run.case.scenario,
+        "kind": None if scenario is None else scenario.kind,
+        "knowable": knowable(prepared.faults) if failing else None,
+        "seed": run.case.seed,
+        "strategy": run.strategy,
+        "detector": run.detector,
+        "threshold": run.threshold,
+        "without": run.without,
+        "known": moments[0] if failing else None,
+        "effect": moments[1] if failing else None,
+    }
+
+
+def _same(a: BoundaryRecord, b: BoundaryRecord) -> bool:
+    """Whether two entries are looks of one moment."""
+    return (a.index, a.when, b.looks) == (b.index, b.when, a.looks + 1)
+
+
+def _judged(
+    boundary: BoundaryRecord, record: EpisodeRecord, possible: bool, reachable: bool
+) -> Judged:
+    verdict, diagnosis, replan = boundary.verdict, boundary.diagnosis, boundary.replan
+    decision = Decision.PROCEED if verdict is None else verdict.decision
+    if decision is Decision.LOOK_AGAIN:
+        decision = Decision.REPLAN  # the last look, and it still does not fit
+    return Judged(
+        index=boundary.index,
+        when=boundary.when.value,
+        subtask=str(boundary.subtask),
+        time_s=boundary.time_s,
+        score=None if verdict is None else verdict.score,
+        decision=decision.value,
+        confirmed=diagnosis is not None and bool(diagnosis.must_change),
+        replanned=replan is not None and replan.plan is not None and record.strategy != "watch",
+        cause="" if diagnosis is None else diagnosis.cause,
+        looks=boundary.looks,
+        scores={v.detector: v.score for v in boundary.watched},
+        possible=possible,
+        reachable=reachable,
+    )
+
+
+@cache
+def _frames() -> FrameMemory:
+    """What this process drew lately."""
+    return FrameMemory()
+
+
+@cache
+def _memory(task: str, settings: Settings) -> tuple[tuple[Demonstration, ...], str]:
+    path = settings.memory or str(
+        ready_made(
+            task,
+            settings.states,
+            workers=1,
+            feature=settings.feature,
+            image_encoder=settings.image_encoder,
+            captioner=settings.captioner,
+        )
+    )
+    with open_store(path) as store:
+        return tuple(store.required()), path
+
+
+__all__ = ["PAGES", "Work", "broken_row", "config_of", "run_one"]

@@ -1,0 +1,37 @@
+"""A digest of the project's own sources: what was computed by other code is not mixed in."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+_ROOT = Path(__file__).parent
+
+PRESENTATION = ("cli", "report", "training", "experiments")
+"""Packages that show results or train models, and change no run."""
+
+COUNTING = (
+    "cells", "findings", "intervals", "metrics", "orderings", "outcomes", "paper", "summary",
+    "sweep", "tables",
+)  # fmt: skip
+"""Modules of the benchmark that count what was run."""
+
+
+def sources_digest(extra: Sequence[object] = (), without: Sequence[str] = PRESENTATION) -> str:
+    """Sixteen hexadecimal digits of the sources, the shipped data, and what is given besides.
+
+    Args:
+        extra: further things that what is keyed depends on; their `repr` counts.
+        without: top-level packages that do not matter.
+    """
+    digest = hashlib.blake2b(repr(tuple(extra)).encode(), digest_size=8)
+    for path in sorted(
+        p for p in _ROOT.rglob("*") if p.suffix in (".py", ".toml", ".onnx", ".json")
+    ):
+        place = path.relative_to(_ROOT)
+        counting = place.parts[0] == "benchmark" and place.stem in COUNTING
+        if place.parts[0] not in without and not counting:
+            digest.update(place.as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()

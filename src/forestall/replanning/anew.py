@@ -1,0 +1,61 @@
+"""Planning anew for the goal, whatever the cause: what is left where nothing is known of it.
+
+Called where a replanner can stand, together with the reasoner that gives no cause (the ablation of
+paper, Table 2: "uninformed replanning"); calls `planning`. Nothing of the old plan is kept.
+"""
+
+from __future__ import annotations
+
+import time
+
+from forestall.interfaces import PlanValidator
+from forestall.planning.planner import plan_goal
+from forestall.planning.search import SearchConfig
+from forestall.planning.validate import observed
+from forestall.types.plan import Plan
+from forestall.types.runtime import BoundaryContext
+from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome
+from forestall.vocabulary import Vocabulary
+
+
+class GoalReplanner:
+    """Plans from what is seen to the task's goal (implements `Replanner`).
+
+    Args:
+        validator: accepts or refuses the plan.
+        vocabulary: the categories.
+        config: bounds of the search.
+    """
+
+    name = "goal planner"
+
+    def __init__(
+        self, validator: PlanValidator, vocabulary: Vocabulary, config: SearchConfig | None = None
+    ) -> None:
+        self.validator = validator
+        self.vocabulary = vocabulary
+        self.config = config or SearchConfig()
+
+    def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
+        """A plan for the goal; of the diagnosis only counts whether anything must change."""
+        start_s = time.perf_counter()
+        if not diagnosis.must_change:
+            outcome = ReplanOutcome.NOTHING_TO_CHANGE
+            return Replan(outcome, producer=self.name, note=diagnosis.cause)
+        goal = context.task.goal
+        planned = plan_goal(observed(context.graph, self.vocabulary), goal, self.config)
+        plan, check, outcome, note = None, None, planned.outcome, planned.note
+        if outcome is ReplanOutcome.SOLVED:
+            plan = Plan(planned.subtasks, context.plan.goal or goal.text)
+            check = self.validator.check(plan, context.graph, goal)
+            if not check.ok:
+                outcome, note = ReplanOutcome.REJECTED, check.reason
+        return Replan(
+            outcome,
+            plan,
+            check,
+            self.name,
+            planned.expanded,
+            time.perf_counter() - start_s,
+            note,
+        )

@@ -1,0 +1,199 @@
+"""What strategies share once something looks wrong: the alarm, the repair and its bounds.
+
+Called by proactive, online and post-hoc; calls replanner and validator, which it is given. When
+the alarm is raised is the strategy's own affair; what follows from it is the same for all.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+
+from forestall.interfaces import PlanValidator, Replanner
+from forestall.types.facts import Literal
+from forestall.types.plan import Plan, same_step
+from forestall.types.runtime import BoundaryContext, StrategyAnswer
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Diagnosis,
+    Replan,
+    ReplanOutcome,
+    Verdict,
+)
+
+PLAN_CHECK = "plan check"
+GOAL_CHECK = "goal check"
+SKILL_STATUS = "skill status"
+
+
+@dataclass(slots=True)
+class Clock:
+    """Compute seconds by phase."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    _last: float = field(default_factory=time.perf_counter)
+
+    def lap(self, name: str) -> None:
+        """Book what has passed since the last call under a name."""
+        now = time.perf_counter()
+        self.seconds[name] = self.seconds.get(name, 0.0) + now - self._last
+        self._last = now
+
+    def items(self) -> tuple[tuple[str, float], ...]:
+        """Seconds by phase."""
+        return tuple(self.seconds.items())
+
+
+class Intervention:
+    """Replans after an alarm and remembers what was tried.
+
+    A cause whose repair did not help after `max_attempts` attempts is left alone, so that a run
+    cannot turn in circles. When a fact must change, no plan changes it, and the plan at hand does
+    not check out either, the run stops safely.
+
+    Args:
+        replanner: makes the corrected plan.
+        validator: says whether what is left of a plan runs on what is seen.
+        max_attempts: repairs of one cause.
+    """
+
+    def __init__(self, replanner: Replanner, validator: PlanValidator, max_attempts: int) -> None:
+        self._replanner = replanner
+        self._validator = validator
+        self._max_attempts = max_attempts
+        self._resume_left = 0
+        self._attempts: dict[tuple[Literal, ...], int] = {}
+
+    def begin(self, context: BoundaryContext) -> None:
+        """To be called before every subtask: forgets the last episode when a new one begins."""
+        if context.replans == 0:
+            self._resume_left = len(context.plan)
+            if context.index == 0:
+                self._attempts.clear()
+
+    def repairs(self, context: BoundaryContext) -> bool:
+        """Whether the subtask belongs to a repair, for which there is no demonstration."""
+        return len(context.plan) - context.index > self._resume_left
+
+    def check_rest(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer:
+        """Inside a repair: does what is left of the plan still run from what is seen?"""
+        diagnosis = self.why_not(context, clock)
+        verdict = checked(
+            PLAN_CHECK,
+            diagnosis is None,
+            "a step of the repair: the rest of the plan is checked instead of compared",
+        )
+        if diagnosis is None:
+            return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        if context.may_look:
+            return look_again(verdict, clock, diagnosis.cause)
+        return self.alarm(context, verdict, diagnosis, clock)
+
+    def why_not(self, context: BoundaryContext, clock: Clock) -> Diagnosis | None:
+        """Why what is left of the plan would not run from what is seen, None if it would."""
+        check = self._validator.check(rest_of(context), context.graph, context.task.goal)
+        clock.lap("validate")
+        if check.ok:
+            return None
+        return Diagnosis(
+            cause=f"what is left of the plan would not work: {check.reason}",
+            must_change=check.lacking or check.unmet,
+            producer=PLAN_CHECK,
+        )
+
+    def check_goal(self, context: BoundaryContext, clock: Clock) -> tuple[Verdict, Diagnosis]:
+        """Is the task's goal reached on what is seen? Names what of it is not."""
+        check = self._validator.check(Plan(()), context.graph, context.task.goal)
+        clock.lap("validate")
+        verdict = checked(GOAL_CHECK, check.ok, "the plan is finished: its goal is checked")
+        missing = ", ".join(map(str, check.unmet))
+        return verdict, Diagnosis(
+            cause="" if check.ok else f"the goal is not reached: {missing}",
+            must_change=check.unmet,
+            producer=GOAL_CHECK,
+        )
+
+    def alarm(
+        self,
+        context: BoundaryContext,
+        verdict: Verdict,
+        diagnosis: Diagnosis,
+        clock: Clock,
+    ) -> StrategyAnswer:
+        """Replan for what must change; `context.index` is where the plan at hand would go on."""
+        if not diagnosis.must_change:
+            replan = Replan(ReplanOutcome.NOTHING_TO_CHANGE, producer=self._replanner.name)
+            return StrategyAnswer(
+                Decision.PROCEED, verdict, diagnosis, replan, "nothing must change", clock.items()
+            )
+        key = tuple(sorted(diagnosis.must_change))
+        if self._attempts.get(key, 0) >= self._max_attempts:
+            why = f"tried {self._max_attempts} repairs of this already"
+            return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
+        replan = self._replanner.replan(context, diagnosis)
+        clock.lap("replan")
+        if replan.outcome is ReplanOutcome.SOLVED and replan.plan is not None:
+            self._attempts[key] = self._attempts.get(key, 0) + 1
+            self._resume_left = min(self._resume_left, _common_suffix(replan.plan, context))
+            return StrategyAnswer(
+                Decision.REPLAN, verdict, diagnosis, replan, diagnosis.cause, clock.items()
+            )
+        if context.may_look:
+            return StrategyAnswer(
+                Decision.LOOK_AGAIN, verdict, diagnosis, replan, replan.note, clock.items()
+            )
+        return self._no_plan(context, verdict, diagnosis, replan, clock)
+
+    def _no_plan(
+        self,
+        context: BoundaryContext,
+        verdict: Verdict,
+        diagnosis: Diagnosis,
+        replan: Replan,
+        clock: Clock,
+    ) -> StrategyAnswer:
+        """Go on only if the plan at hand still checks out on what is seen."""
+        check = self._validator.check(rest_of(context), context.graph, context.task.goal)
+        clock.lap("validate")
+        decision = Decision.PROCEED if check.ok else Decision.STOP
+        why = "no repair found; " + (
+            "the plan at hand still checks out" if check.ok else f"stopped: {check.reason}"
+        )
+        return StrategyAnswer(decision, verdict, diagnosis, replan, why, clock.items())
+
+
+def checked(detector: str, fine: bool, note: str) -> Verdict:
+    """A verdict that compares nothing: something was checked, and it is fine or calls an alarm."""
+    return Verdict(
+        Decision.PROCEED if fine else Decision.REPLAN,
+        detector,
+        score=None,
+        threshold=0.0,
+        calibration=Calibration.FIXED,
+        note=note,
+    )
+
+
+def look_again(verdict: Verdict, clock: Clock, why: str = "") -> StrategyAnswer:
+    """Ask for another look before anything is claimed."""
+    verdict = replace(verdict, decision=Decision.LOOK_AGAIN)
+    return StrategyAnswer(Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items())
+
+
+def rest_of(context: BoundaryContext) -> Plan:
+    """What is left of the plan, with the drive before it: where the robot stands matters."""
+    start = context.index
+    if start > 0 and context.plan.subtasks[start - 1].skill == "navigate_to_obj":
+        start -= 1
+    return Plan(context.plan.subtasks[start:], context.plan.goal)
+
+
+def _common_suffix(plan: Plan, context: BoundaryContext) -> int:
+    """How many subtasks at the end of a corrected plan are the old plan's own."""
+    same = 0
+    for new, old in zip(reversed(plan.subtasks), reversed(context.remaining()), strict=False):
+        if not same_step(new, old):
+            break
+        same += 1
+    return same

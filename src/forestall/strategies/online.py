@@ -1,0 +1,176 @@
+"""Replanning after a subtask has failed (REFLECT-online, paper, Sec. 4 and Table 1).
+
+Called by the runtime before and after each subtask and at the end of the plan. Retriever, detector,
+reasoner, replanner and validator come through the constructor, the same as the proactive strategy
+has; what follows an alarm is in `intervention.py`. Only the time differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked, look_again
+from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.facts import Literal
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Subtask
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
+from forestall.types.verdict import Decision, Diagnosis, Reference, Verdict
+
+_GO_ON = StrategyAnswer(Decision.PROCEED)
+
+
+class Online:
+    """Judges the outcome of each subtask when it is over.
+
+    - The robot's own controller says that the skill did not succeed: what the subtask needs and
+      does not hold is named from the scenes before it in the demonstrations, and the rest of the
+      plan, this subtask included, is replanned. Why the controller gave up is not asked.
+    - It went through, and the scene after it does not fit the scenes after it in the
+      demonstrations: what held there and does not here must change, and the plan goes on behind it.
+    - The plan is finished: its goal is checked on what is seen.
+
+    What was wrong before the subtask already is not its outcome: whether a subtask has succeeded is
+    another question than whether the next one will. It becomes its outcome when the subtask puts
+    something into or onto the thing that is wrong, as slices into a bowl of wine (paper, Sec. 4).
+    Steps of a repair have no demonstration; what is left of the plan is checked after them.
+
+    Args:
+        retriever: finds the references.
+        detector: judges the scene after a subtask.
+        reasoner: explains.
+        replanner: makes the corrected plan.
+        validator: says whether what is left of a plan runs on what is seen.
+        scope: the part of a graph that concerns a subtask, as the perceiver cuts it.
+        max_attempts: repairs of one cause.
+        inherited: whether every deviation counts that was there before the subtask.
+    """
+
+    name = "online"
+    looks_after = LooksAfter.SUBTASK
+
+    def __init__(
+        self,
+        retriever: Retriever,
+        detector: Detector,
+        reasoner: Reasoner,
+        replanner: Replanner,
+        validator: PlanValidator,
+        scope: Callable[[SceneGraph, Subtask], SceneGraph],
+        max_attempts: int = 2,
+        *,
+        inherited: bool = False,
+    ) -> None:
+        self._retriever = retriever
+        self._detector = detector
+        self._reasoner = reasoner
+        self._intervention = Intervention(replanner, validator, max_attempts)
+        self._scope = scope
+        self._inherited = inherited
+        self._before: BoundaryContext | None = None
+
+    def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
+        """Go on; what is seen now is kept for when the subtask is over."""
+        self._intervention.begin(context)
+        self._before = context
+        return _GO_ON
+
+    def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
+        """Did the subtask succeed? On a failure diagnose and replan."""
+        clock = Clock()
+        if outcome.status is not SkillStatus.SUCCEEDED:
+            return self._failed(context, outcome.status, clock)
+        onward = replace(context, index=context.index + 1)
+        if self._intervention.repairs(context):
+            return self._intervention.check_rest(onward, clock)
+        references = self._references(context)
+        after = tuple(
+            replace(r, graph=self._scope(r.after, r.subtask))
+            for r in references
+            if r.after is not None
+        )
+        clock.lap("retrieve")
+        verdict = self._detector.judge(context.scoped, context.observation, after)
+        clock.lap("compare")
+        if verdict.decision is Decision.LOOK_AGAIN and context.may_look:
+            return look_again(verdict, clock)
+        if verdict.decision is Decision.PROCEED:
+            return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        verdict = replace(verdict, decision=Decision.REPLAN)
+        diagnosis = self._reasoner.diagnose(replace(context, references=after), verdict)
+        diagnosis = self._outcome_only(diagnosis, references, verdict)
+        clock.lap("diagnose")
+        return self._intervention.alarm(onward, verdict, diagnosis, clock)
+
+    def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
+        """Is the goal reached on what is seen?"""
+        clock = Clock()
+        verdict, diagnosis = self._intervention.check_goal(context, clock)
+        if verdict.decision is Decision.PROCEED:
+            return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        if context.may_look:
+            return look_again(verdict, clock, diagnosis.cause)
+        return self._intervention.alarm(context, verdict, diagnosis, clock)
+
+    def _failed(
+        self, context: BoundaryContext, status: SkillStatus, clock: Clock
+    ) -> StrategyAnswer:
+        """What does the subtask need that does not hold now? It is still to be done."""
+        verdict = checked(
+            SKILL_STATUS, False, f"the robot reports that the skill was {_SAID[status]}"
+        )
+        diagnosis = None
+        if not self._intervention.repairs(context):
+            references = self._references(context)
+            clock.lap("retrieve")
+            needs = replace(context, references=references, when=When.BEFORE)
+            diagnosis = self._reasoner.diagnose(needs, verdict)
+            clock.lap("diagnose")
+        if diagnosis is None or not diagnosis.must_change:
+            diagnosis = self._intervention.why_not(context, clock) or diagnosis
+        if diagnosis is None:
+            diagnosis = Diagnosis(f"nothing is seen that stands against {context.subtask}", ())
+        if not diagnosis.must_change and context.may_look:
+            return look_again(verdict, clock, diagnosis.cause)
+        return self._intervention.alarm(context, verdict, diagnosis, clock)
+
+    def _references(self, context: BoundaryContext) -> tuple[Reference, ...]:
+        return tuple(self._retriever.retrieve(context.subtask, context.task.name, context.done))
+
+    def _outcome_only(
+        self, diagnosis: Diagnosis, references: tuple[Reference, ...], verdict: Verdict
+    ) -> Diagnosis:
+        """The diagnosis without what was wrong before and is no affair of the subtask."""
+        if self._inherited or self._before is None or not diagnosis.must_change:
+            return diagnosis
+        before = replace(self._before, references=references)
+        known = set(self._reasoner.diagnose(before, verdict).must_change)
+        own = tuple(
+            x
+            for x in diagnosis.must_change
+            if x not in known or _of_the_receiver(x, before.subtask)
+        )
+        if own == diagnosis.must_change:
+            return diagnosis
+        if not own:
+            cause = f"nothing was found that the subtask did wrong; before it: {diagnosis.cause}"
+        elif own[0] == diagnosis.must_change[0]:
+            cause = diagnosis.cause
+        else:
+            cause = f"after {before.subtask} it is not so that {', '.join(map(str, own))}"
+        return replace(diagnosis, cause=cause, must_change=own)
+
+
+def _of_the_receiver(literal: Literal, subtask: Subtask) -> bool:
+    """Whether a fact is a state of the thing that the subtask puts something into or onto."""
+    roles = subtask.roles()
+    return len(roles) == 2 and literal.is_state and roles["?target"] in literal.args
+
+
+_SAID = {
+    SkillStatus.SUCCEEDED: "done",
+    SkillStatus.REFUSED: "refused",
+    SkillStatus.FAILED: "begun and went wrong",
+}

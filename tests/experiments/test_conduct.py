@@ -1,0 +1,173 @@
+"""Experiments: which episodes, resumed after a kill, refused where they do not fit."""
+
+from __future__ import annotations
+
+import errno
+import json
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import IO
+
+import pytest
+
+from experiments.episodes import DEADLY, computed_row, deadly_row
+from forestall.benchmark.cases import CASE_SETS, Case, cases
+from forestall.benchmark.rows import EpisodeRow
+from forestall.errors import FileFormatError, ForestallError, InputError
+from forestall.experiments.conduct import Plan, conduct, implied
+from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder
+from forestall.experiments.runs import Run, Settings, by_scene, runs_for
+
+SMALL = Plan("proactive", "development", limit=2, workers=2)
+
+
+def quiet(done: int, total: int, what: str) -> None:
+    """No progress."""
+
+
+def play(plan: Plan, out: Path, compute: object = computed_row) -> list[EpisodeRow]:
+    return conduct(plan, out, quiet, compute, lambda *a: None)  # type: ignore[arg-type]
+
+
+def test_splits_share_no_seed_and_every_failing_case_has_its_twin() -> None:
+    for of in CASE_SETS:
+        development, test = cases(of, "development"), cases(of, "test")
+        assert {c.seed for c in development}.isdisjoint(c.seed for c in test)
+        assert len(set(test)) == len(test)
+    undisturbed = set(cases("undisturbed", "test"))
+    for of in ("robofail", "irreversible", "harmless"):
+        found = cases(of, "test")
+        assert {c.twin for c in found} <= undisturbed
+    assert len(cases("robofail", "test")) == 100
+    assert len(cases("irreversible", "test")) >= 50
+    assert len(undisturbed) >= 100
+    assert len(cases("harmless", "test")) >= 100
+    assert len(cases("robofail", "test", rounds=2)) == 200
+    with pytest.raises(InputError, match="rounds"):
+        cases("robofail", "test", rounds=0)
+    with pytest.raises(InputError, match="development"):
+        cases("robofail", "dev")
+
+
+def test_all_holds_every_other_experiment_and_each_episode_once() -> None:
+    everything = runs_for("all", "test")
+    assert len(set(everything)) == len(everything)
+    assert len({r.key for r in everything}) == len(everything)
+    for name in ("proactive", "detection", "ablation"):
+        assert set(runs_for(name, "test")) <= set(everything)
+    with pytest.raises(InputError, match="ablation"):
+        runs_for("ablations", "test")
+    with pytest.raises(InputError, match="limit"):
+        runs_for("all", "test", limit=0)
+
+
+def test_a_limit_takes_cases_of_all_tasks_in_turn() -> None:
+    runs = [r for r in runs_for("proactive", "test", limit=10) if r.case.set == "robofail"]
+    assert len({r.case.task for r in runs}) == 10
+    assert len({r.case for r in runs}) == 10
+
+
+def test_the_unmonitored_run_of_a_case_comes_first_within_its_scene() -> None:
+    for group in by_scene(runs_for("all", "test", limit=5)):
+        assert len({r.scene for r in group}) == 1
+        for run in group:
+            assert group.index(Run(run.case, "watch")) <= group.index(run)
+
+
+def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
+    whole = play(SMALL, tmp_path / "whole")
+    lines = (tmp_path / "whole" / ROWS).read_text().splitlines(keepends=True)
+    assert len(lines) == len(whole) == len(runs_for("proactive", "development", limit=2))
+    half = tmp_path / "half"
+    half.mkdir()
+    (half / ABOUT).write_bytes((tmp_path / "whole" / ABOUT).read_bytes())
+    (half / ROWS).write_text("".join(lines[:5]) + lines[5][:40])
+    told: list[int] = []
+    rows = conduct(SMALL, half, lambda d, t, w: told.append(d), computed_row, lambda *a: None)
+    assert told[0] == 5
+    assert told[-1] == len(whole)
+    assert [r.key for r in rows] == [r.key for r in whole]
+    assert (half / ROWS).read_text().startswith("".join(lines[:5]))
+    again = play(SMALL, half, deadly_row)  # nothing is left to compute
+    assert again == rows
+
+
+def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_path: Path) -> None:
+    rows = play(replace(SMALL, workers=1), tmp_path, deadly_row)
+    broken = [r for r in rows if r.end == "error"]
+    assert len(rows) == len(runs_for("proactive", "development", limit=2))
+    assert {r.task for r in broken} == {DEADLY}
+    assert all("died" in r.error and not r.success for r in broken)
+
+
+def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> None:
+    play(SMALL, tmp_path)
+    with pytest.raises(InputError, match="split"):
+        play(replace(SMALL, split="test"), tmp_path)
+    with pytest.raises(InputError, match="settings"):
+        play(replace(SMALL, settings=Settings(states="oracle")), tmp_path)
+    about = json.loads((tmp_path / ABOUT).read_text())
+    (tmp_path / ABOUT).write_text(json.dumps(about | {"version": "0.0.1"}))
+    with pytest.raises(InputError, match=r"version '0\.0\.1'"):
+        play(SMALL, tmp_path)
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "precious.txt").write_text("mine")
+    with pytest.raises(InputError, match="another --out"):
+        play(SMALL, tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file"):
+        play(SMALL, tmp_path / "file")
+
+
+def test_a_damaged_line_is_named(tmp_path: Path) -> None:
+    play(SMALL, tmp_path)
+    lines = (tmp_path / ROWS).read_text().splitlines()
+    lines[2] = json.dumps(json.loads(lines[2]) | {"format": 0})
+    (tmp_path / ROWS).write_text("\n".join(lines) + "\n")
+    with pytest.raises(FileFormatError, match="line 3: a result of format 0"):
+        play(SMALL, tmp_path)
+
+
+def test_a_full_disk_is_said_and_what_was_finished_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full(StringIO):
+        def flush(self) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    real, calls = ResultsFolder.add, []
+
+    def add(self: ResultsFolder, lines: IO[str], row: EpisodeRow) -> None:
+        calls.append(row)
+        real(self, Full() if len(calls) == 3 else lines, row)
+
+    monkeypatch.setattr(ResultsFolder, "add", add)
+    with pytest.raises(ForestallError, match="No space left on device"):
+        play(SMALL, tmp_path)
+    assert len((tmp_path / ROWS).read_text().splitlines()) == 2
+
+
+def test_a_run_is_spared_only_where_its_detector_never_alarms() -> None:
+    case = Case("robofail", "heat-potato", "microwave-occupied", 10_000)
+    watched = EpisodeRow.from_json(computed_row_of(Run(case, "watch")))
+    rows = {watched.key: watched}
+    assert min(s for j in watched.judged if (s := j.scores["image"]) is not None) == 0.86
+    found = implied(Run(case, "proactive", "image", 0.85), rows)
+    assert found is not None
+    assert found.implied
+    assert found.key == Run(case, "proactive", "image", 0.85).key
+    assert found.success == watched.success
+    assert implied(Run(case, "proactive", "image", 0.90), rows) is None
+    assert implied(Run(case, "proactive", "scene-graph", 0.85), rows) is None
+    looked = replace(watched, judged=(replace(watched.judged[0], looks=2), *watched.judged[1:]))
+    assert implied(Run(case, "proactive", "image", 0.85), {looked.key: looked}) is None
+    assert implied(Run(case, "proactive", "image", 0.85), {}) is None
+
+
+def computed_row_of(run: Run) -> dict[str, object]:
+    from forestall.experiments.worker import Work
+
+    return computed_row(Work(run, Settings()))
