@@ -11,6 +11,11 @@ _ROOT = Path(__file__).parent
 PRESENTATION = ("cli", "report", "training", "experiments")
 """Packages that show results or train models, and change no run."""
 
+ROW_MAKING = (
+    "experiments/conduct.py", "experiments/runs.py", "experiments/worker.py", "report/derived.py",
+)  # fmt: skip
+"""What makes the rows of an experiment from its runs all the same."""
+
 COUNTING = (
     "cells", "findings", "intervals", "metrics", "orderings", "outcomes", "paper", "summary",
     "sweep", "tables",
@@ -18,12 +23,12 @@ COUNTING = (
 """Modules of the benchmark that count what was run."""
 
 
-def sources_digest(extra: Sequence[object] = (), without: Sequence[str] = PRESENTATION) -> str:
+def sources_digest(extra: Sequence[object] = (), but: Sequence[str] = ()) -> str:
     """Sixteen hexadecimal digits of the sources, the shipped data, and what is given besides.
 
     Args:
         extra: further things that what is keyed depends on; their `repr` counts.
-        without: top-level packages that do not matter.
+        but: files of the packages that show results, which matter all the same.
     """
     digest = hashlib.blake2b(repr(tuple(extra)).encode(), digest_size=8)
     for path in sorted(
@@ -31,7 +36,8 @@ def sources_digest(extra: Sequence[object] = (), without: Sequence[str] = PRESEN
     ):
         place = path.relative_to(_ROOT)
         counting = place.parts[0] == "benchmark" and place.stem in COUNTING
-        if place.parts[0] not in without and not counting:
+        shows = place.parts[0] in PRESENTATION and place.as_posix() not in but
+        if not shows and not counting:
             digest.update(place.as_posix().encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -142,15 +142,14 @@ def make_strategy(
     if config.strategy == "watch":
         reasoner = SymbolicReasoner(mine, violations, vocabulary)
         return kind(retriever, make_watchers(config, vocabulary), reasoner)  # type: ignore[no-any-return]
-    validator = make_validator(config, vocabulary)
     parts: list[Any] = [
         retriever,
         make_detector(config, vocabulary),
         make_reasoner(config, vocabulary),
-        make_replanner(config, validator, vocabulary),
-        validator,
+        make_replanner(config, vocabulary),
+        GraphValidator(vocabulary),
     ]
-    if config.strategy == "online":
+    if config.strategy in ("online", "online-scene"):
         parts.append(partial(scope, vocabulary=vocabulary, config=ScopeConfig()))
     return kind(*parts)  # type: ignore[no-any-return]
 
@@ -164,20 +163,19 @@ def make_reasoner(config: RunConfig, vocabulary: Vocabulary) -> Reasoner:
     return SymbolicReasoner(mine, violations, vocabulary)
 
 
-def make_replanner(
-    config: RunConfig, validator: PlanValidator, vocabulary: Vocabulary
-) -> Replanner:
-    """What corrects the plan; all of it anew where no reason is known."""
+def make_replanner(config: RunConfig, vocabulary: Vocabulary) -> Replanner:
+    """What corrects the plan: all of it anew where no reason is known.
+
+    Where validation is left out, the first plan that is found is taken unchecked.
+    """
+    validator: PlanValidator = GraphValidator(vocabulary)
+    if config.without == "validation":
+        validator = AcceptAll()
     if config.without == "reasoning":
         from forestall.replanning.anew import GoalReplanner
 
         return GoalReplanner(validator, vocabulary)
     return PlannerReplanner(validator, vocabulary)
-
-
-def make_validator(config: RunConfig, vocabulary: Vocabulary) -> PlanValidator:
-    """What executes plans on an observed graph; nothing where validation is left out."""
-    return AcceptAll() if config.without == "validation" else GraphValidator(vocabulary)
 
 
 def make_detector(config: RunConfig, vocabulary: Vocabulary) -> Detector:

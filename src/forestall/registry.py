@@ -18,6 +18,7 @@ TABLES: dict[str, dict[str, str]] = {
     "strategy": {
         "none": "forestall.strategies.none:NoReplanning",
         "online": "forestall.strategies.online:Online",
+        "online-scene": "forestall.strategies.online:OnlineScene",
         "post-hoc": "forestall.strategies.post_hoc:PostHoc",
         "proactive": "forestall.strategies.proactive:Proactive",
         "watch": "forestall.strategies.watch:Watch",

@@ -87,6 +87,9 @@ def test_all_hundred_are_there_with_their_kinds_and_sources() -> None:
     assert len({(s.task, s.title) for s in scenarios}) == 100
 
 
+BROKEN_BY_FALLING = ("robofail-cook-egg-1", "robofail-heat-potato-1", "robofail-store-egg-8")
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_scenario_fits_its_task_and_says_when_it_can_be_known(name: str) -> None:
     scenario = load_scenario(name)
@@ -95,10 +98,8 @@ def test_a_scenario_fits_its_task_and_says_when_it_can_be_known(name: str) -> No
     check_steps(plan, scenario.faults, loaded.vocabulary)
     known, effect = scenario.moments(plan)
     assert known is not None and effect is not None
-    if scenario.kind in SLIPS:
-        assert known == effect + 1
-    else:
-        assert known <= effect
+    broken = name in BROKEN_BY_FALLING
+    assert (known == effect + 1) if broken else (known <= effect)
     if scenario.kind in SCENE:
         assert (known == 0) == (name not in INSIDE_CLOSED)
         opened = plan.texts()[:known]
@@ -116,6 +117,9 @@ def test_nobody_steps_in_and_the_task_fails(name: str) -> None:
         kitchen, refused = _play(scenario, seed)
         strict, _, why = TruthGoalChecker().check(goal, kitchen.oracle)
         assert not strict and why
+        late = [step for step, _ in refused if step >= known]
+        if scenario.kind in SLIPS and name not in BROKEN_BY_FALLING:
+            assert effect == (late[0] if late else len(plan))
         if refused:  # nothing is refused before the failure could be known or was done
             assert refused[0][0] >= min(known, effect)
 

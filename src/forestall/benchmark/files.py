@@ -143,7 +143,9 @@ class Scenario:
         source: which published episode it rebuilds, empty for one of our own.
         known: the first step of its plan before which one who looks well and knows the task can
             know that the run will fail, "end" for after the last one; None for a harmless one.
-        effect: the step that does the harm, "end" where the plan stops too early; None likewise.
+        effect: the first step from then on that is refused or does harm because of it (a thing
+            that breaks by falling: the step on which it falls), "end" where none is and the run
+            merely ends without its goal; None likewise.
 
     Both are a step in text form; " #2" behind it means its second occurrence.
     """

@@ -40,7 +40,7 @@ THRESHOLDS = (0.90, 0.85, 0.80)
 
 RANDOM_DRAWS = 200
 
-ALWAYS, NEVER, RANDOM, TRUTH = "always", "never", "random", "true preconditions"
+ALWAYS, NEVER, RANDOM, TRUTH = "always", "never", "random", "true plan check"
 TRIVIAL = (ALWAYS, NEVER, RANDOM, TRUTH)
 """Detectors that cost nothing, and the simulator's truth as the upper bound."""
 

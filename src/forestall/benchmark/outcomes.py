@@ -89,9 +89,12 @@ def outcome_metrics(runs: Sequence[EpisodeRow]) -> dict[str, Metric]:
     """Success, harm, time and effort of one strategy on one set.
 
     `tet` is the paper's total execution time: robot time (`simulated_s`) plus what it spends on
-    judging and planning (`reasoning_s`); each also over the successful runs alone.
+    judging and planning (`reasoning_s`); each also over the successful runs alone. Runs that broke
+    off have no time, and runs that were not executed, since they must be the watched ones, have no
+    computing time where somebody judges.
     """
-    good = [r for r in runs if succeeded(r)]
+    timed = [r for r in runs if r.end != ERROR and not (r.implied and r.strategy != NO_STRATEGY)]
+    good = [r for r in timed if succeeded(r)]
     has_weak = {r.task for r in runs if r.weak_success is not None}
     weak = [r for r in runs if r.weak_success is not None or r.task in has_weak]
     return {
@@ -101,11 +104,11 @@ def outcome_metrics(runs: Sequence[EpisodeRow]) -> dict[str, Metric]:
         "errors": proportion([r.end == ERROR for r in runs]),
         "stopped": proportion([r.end == STOPPED for r in runs]),
         "replanned": proportion([r.replans > 0 for r in runs]),
-        "simulated_s": _mean(runs, lambda r: r.simulated_s),
+        "simulated_s": _mean(timed, lambda r: r.simulated_s),
         "simulated_s_successful": _mean(good, lambda r: r.simulated_s),
-        "reasoning_s": _mean(runs, lambda r: r.reasoning_s),
+        "reasoning_s": _mean(timed, lambda r: r.reasoning_s),
         "reasoning_s_successful": _mean(good, lambda r: r.reasoning_s),
-        "tet_s": _mean(runs, lambda r: r.simulated_s + r.reasoning_s),
+        "tet_s": _mean(timed, lambda r: r.simulated_s + r.reasoning_s),
         "tet_s_successful": _mean(good, lambda r: r.simulated_s + r.reasoning_s),
         "replans": _mean(runs, lambda r: r.replans),
         "planner_calls": _mean(runs, lambda r: r.planner_calls),

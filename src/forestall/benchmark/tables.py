@@ -243,8 +243,7 @@ def _trivial(of: str, found: Mapping[str, Any], names: Names) -> Table:
         f"Beside detectors that cost nothing, and the truth; failing runs of the {of} set",
         ("detector", *heads(_POINT)),
         tuple(rows),
-        '"random" alarms as often as the primary detector; "true preconditions" asks the'
-        " simulator.",
+        '"random" alarms as often as the primary detector; "true plan check" asks the simulator.',
     )
 
 

@@ -8,10 +8,11 @@ which a failure exists. Built by `build` with the oracle, read by the experiment
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from forestall.interfaces import OracleView
 from forestall.planning.validate import GraphValidator
+from forestall.strategies.intervention import rest_of
 from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
@@ -45,11 +46,13 @@ class TruthTrace:
 
         def look(context: BoundaryContext) -> TrueMoment:
             truth = oracle.truth()
-            rest = Plan(context.plan.subtasks[context.index + self._done(context) :])
+            context = replace(context, index=context.index + self._done(context))
+            rest = rest_of(context)
             whole = validator.check(rest, truth, context.task.goal)
             if whole.ok:
                 return TrueMoment(True, True)
-            step = validator.check(Plan(rest.subtasks[:1]), truth, Goal(""))
+            first = len(rest) - len(context.remaining()) + 1
+            step = validator.check(Plan(rest.subtasks[:first]), truth, Goal(""))
             return TrueMoment(step.ok, False)
 
         self._look = look

@@ -14,7 +14,7 @@ from cyclopts import App, Parameter
 if TYPE_CHECKING:
     from forestall.benchmark.tables import Table
 
-MAIN_TABLES = ("strategies", "detectors-robofail", "ablation", "paper")
+MAIN_TABLES = ("paper",)
 """Printed; all of them are in the folder."""
 
 Flag = Annotated[bool, Parameter(negative="")]
@@ -130,8 +130,8 @@ def _experiment(name: str, options: Options) -> int:
     )
     out = options.out or Path("runs") / f"{name}-{options.split}"
     with bar("running", quiet=options.quiet or options.as_json) as feed:
-        runs = conduct(plan, out, feed)
-    return _show(*present(out, runs), out, options.as_json)
+        conduct(plan, out, feed)
+    return _show(*present(out), out, options.as_json)
 
 
 def _show(summary: dict[str, Any], tables: Sequence[Table], folder: Path, as_json: bool) -> int:
@@ -148,6 +148,8 @@ def _show(summary: dict[str, Any], tables: Sequence[Table], folder: Path, as_jso
             console.print(f"\n[bold]{table.title}[/]")
             print_table(table.header, list(table.rows))
     for line in summary["orderings"]:
-        console.print(f"{line['verdict']}: {line['text']}", soft_wrap=True, markup=False)
+        console.print(line["sentence"], soft_wrap=True, markup=False)
+    for name, value in summary["meta"]["effort"].items():
+        console.print(f"{name}: {value}", soft_wrap=True, markup=False)
     print(folder / "index.html")
     return 0

@@ -5,8 +5,7 @@ Calls: command line → here → engines → worker → build. What is in the fo
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from forestall.demonstrations import ready_made
 from forestall.errors import InputError, UnknownNameError
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
-from forestall.experiments.runs import PAGES, Run, Settings, by_scene, runs_for
+from forestall.experiments.runs import PAGES, PAPER_DETECTOR, Run, Settings, by_scene, runs_for
 from forestall.experiments.worker import Work, broken_row, run_one
 from forestall.memory.store import open_store
 
@@ -72,24 +71,26 @@ def conduct(
         raise InputError(f"--jobs {plan.workers}: at least 1 is needed")
     if plan.settings.pages not in PAGES:
         raise UnknownNameError("pages", plan.settings.pages, PAGES)
+    if plan.settings.memory is not None:
+        with open_store(plan.settings.memory) as store:
+            store.required()
     folder = ResultsFolder(out)
-    rows = folder.open(About.now(plan.split, plan.rounds, plan.settings))
-    todo = [r for r in runs if r.key not in rows]
-    if todo:
-        started, before = time.monotonic(), len(runs) - len(todo)
-        (prepare or _demonstrations)(todo, plan, progress)
-        progress(before, len(runs), "episodes")
-        for done, row in enumerate(_computed(todo, rows, folder, plan, compute), before + 1):
-            progress(done, len(runs), row.scenario or row.task)
-        seconds = time.monotonic() - started
-        folder.note_effort(len(todo), seconds, plan.workers, plan.engine)
+    with folder.alone():
+        rows = folder.open(About.now(plan.split, plan.rounds, plan.settings))
+        todo = [r for r in runs if r.key not in rows]
+        if todo:
+            with folder.effort_of(plan.experiment, plan.limit, plan.workers, plan.engine) as count:
+                (prepare or _demonstrations)(todo, plan, progress)
+                before = len(runs) - len(todo)
+                progress(before, len(runs), "episodes")
+                for done, row in enumerate(_computed(todo, rows, folder, plan, compute), 1):
+                    count(done)
+                    progress(before + done, len(runs), row.scenario or row.task)
     return [rows[r.key] for r in runs]
 
 
 def _demonstrations(runs: Sequence[Run], plan: Plan, progress: Progress) -> None:
     if plan.settings.memory is not None:
-        with open_store(plan.settings.memory) as store:
-            store.required()
         return
     for task in sorted({r.case.task for r in runs}):
         ready_made(
@@ -111,7 +112,7 @@ def _computed(
     compute: Callable[[Work], dict[str, Any]],
 ) -> Iterator[EpisodeRow]:
     """Every missing row, written and put among `rows`, as they come."""
-    where = str(folder.path)
+    where = str(folder.path.resolve())
     groups = [[Work(r, plan.settings, where) for r in group] for group in by_scene(todo)]
 
     def spared(work: Work) -> dict[str, Any] | None:
@@ -131,19 +132,20 @@ def _computed(
             yield row
 
 
-def implied(run: Run, rows: dict[str, EpisodeRow]) -> EpisodeRow | None:
-    """The row of a run that must be the unmonitored one, None where it has to be run.
+def implied(run: Run, rows: Mapping[str, EpisodeRow]) -> EpisodeRow | None:
+    """The row of a run that must be the watched one, None where it has to be run.
 
-    A baseline detector that stays at or above its threshold at every boundary of the unmonitored
-    run never interrupts, so that its own run is the same, step by step. Runs in which the robot
-    looked twice anywhere are not spared: the second look was the paper's detector's wish.
+    Where nobody steps in, and where a baseline detector stays at or above its threshold at every
+    boundary of the watched run, the run is the same, step by step. Runs in which the robot looked
+    twice anywhere are not spared: the second look was the wish of the paper's detector.
     """
-    if run.strategy != "proactive" or run.without is not None or run.detector == "scene-graph":
+    alone = run.strategy == "none"
+    if not alone and (run.strategy != "proactive" or run.detector == PAPER_DETECTOR):
         return None
     watched = rows.get(Run(run.case, "watch").key)
     if watched is None or watched.error or any(j.looks > 1 for j in watched.judged):
         return None
-    scores = [j.scores.get(run.detector) for j in watched.judged]
+    scores = [None if alone else j.scores.get(run.detector) for j in watched.judged]
     if any(s is not None and s < run.threshold for s in scores):
         return None
     return replace(
@@ -155,6 +157,7 @@ def implied(run: Run, rows: dict[str, EpisodeRow]) -> EpisodeRow | None:
             replace(j, score=s, decision="proceed", confirmed=False, cause="", scores={})
             for j, s in zip(watched.judged, scores, strict=True)
         ),
+        planner_calls=0,
         compute_s={},
         reasoning_s=0.0,
         implied=True,

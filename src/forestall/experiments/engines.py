@@ -165,7 +165,7 @@ def computed(
             for worker in idle:
                 yield from _taken(worker, waiting, spared)
                 if worker.jobs:
-                    active[worker.lane.submit(function, worker.jobs[0])] = worker
+                    active[_submitted(worker.lane, function, worker.jobs[0])] = worker
             if not active:
                 return
             done, _ = wait(active, return_when=FIRST_COMPLETED)
@@ -188,6 +188,17 @@ def computed(
     finally:
         for lane in lanes:
             lane.close()
+
+
+def _submitted(lane: Lane, function: Callable[[Any], Any], job: Any) -> Future[Any]:
+    """Start a job; a worker that died while it had none is replaced."""
+    try:
+        return lane.submit(function, job)
+    except Exception as error:
+        if not lane.died(error):
+            raise
+        lane.renew()
+        return lane.submit(function, job)
 
 
 def _taken(

@@ -7,13 +7,14 @@ never mixed in.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -21,13 +22,14 @@ import forestall
 from forestall.benchmark.rows import ROW_FORMAT, EpisodeRow
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Settings
-from forestall.fingerprint import sources_digest
+from forestall.fingerprint import ROW_MAKING, sources_digest
 from forestall.report.record import replace_file
 
 KIND = "experiment"
 ABOUT = "experiment.json"
 ROWS = "episodes.jsonl"
 EFFORT = "effort.jsonl"
+LOCK = ".lock"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +45,18 @@ class About:
 
     @classmethod
     def now(cls, split: str, rounds: int, settings: Settings) -> About:
-        """With the digest of the code at hand."""
-        return cls(split, rounds, settings, sources=sources_digest())
+        """With the digest of the code at hand, and of the memory if one is given."""
+        memory = Path(settings.memory).read_bytes() if settings.memory else b""
+        digest = sources_digest([hashlib.blake2b(memory).hexdigest()], but=ROW_MAKING)
+        return cls(split, rounds, replace(settings, pages=""), sources=digest)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the command was called for."""
+
+    experiment: str
+    limit: int | None
 
 
 class ResultsFolder:
@@ -63,21 +75,14 @@ class ResultsFolder:
         Raises:
             InputError: the folder holds other results, or is no folder that can be written.
         """
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be a folder of results: {error}") from error
+        self._claim()
         file = self.path / ABOUT
         if not file.exists():
-            if any(self.path.iterdir()):
-                raise InputError(
-                    f"{self.path} is not empty and holds no experiment: give another --out"
-                )
             with _room(file):
                 replace_file(file, json.dumps({"kind": KIND, **asdict(about)}, indent=2).encode())
             return {}
         self._check(about)
-        return self.rows()
+        return self.rows(mend=True)
 
     def about(self) -> dict[str, Any]:
         """What the folder says of itself.
@@ -94,8 +99,12 @@ class ResultsFolder:
             raise FileFormatError(f"{file}: no experiment")
         return data
 
-    def rows(self) -> dict[str, EpisodeRow]:
+    def rows(self, mend: bool = False) -> dict[str, EpisodeRow]:
         """Every finished episode by key.
+
+        Args:
+            mend: take half a last line, which a kill may leave, out of the file; only where nobody
+                else can be writing.
 
         Raises:
             FileFormatError: a line that is no episode of this version.
@@ -104,7 +113,7 @@ class ResultsFolder:
         if not file.exists():
             return {}
         whole, newline, half = file.read_text(encoding="utf-8").rpartition("\n")
-        if half:
+        if half and mend:
             replace_file(file, (whole + newline).encode())
         rows = {}
         for number, line in enumerate(whole.splitlines(), 1):
@@ -114,6 +123,28 @@ class ResultsFolder:
                 raise FileFormatError(f"{file}, line {number}: {error}") from error
             rows[row.key] = row
         return rows
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other calls of the command out of the folder.
+
+        Raises:
+            InputError: one is at work in it.
+        """
+        self._claim()
+        with _room(self.path / LOCK):
+            lock = (self.path / LOCK).open("a", encoding="utf-8")
+        with lock:
+            try:
+                import fcntl
+            except ImportError:  # no such lock on this system
+                yield
+                return
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise InputError(f"another experiment is writing to {self.path}") from error
+            yield
 
     @contextmanager
     def writing(self) -> Iterator[IO[str]]:
@@ -127,34 +158,76 @@ class ResultsFolder:
             lines.write(json.dumps(row.to_json()) + "\n")
             lines.flush()
 
-    def note_effort(self, episodes: int, seconds: float, workers: int, engine: str) -> None:
-        """Write down what a call of the command did, and on which machine."""
-        effort = {
-            "episodes": episodes,
-            "seconds": round(seconds, 1),
+    @contextmanager
+    def effort_of(
+        self, experiment: str, limit: int | None, workers: int, engine: str
+    ) -> Iterator[Callable[[int], None]]:
+        """Write down what a call of the command was for, and at its end what it did and where.
+
+        Yields what is to be told how many episodes are done.
+        """
+        about = {
+            "experiment": experiment,
+            "limit": limit,
             "jobs": workers,
             "engine": engine,
             "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.platform()}",
             "python": platform.python_version(),
             "date": time.strftime("%Y-%m-%d"),
         }
+        started, done = time.monotonic(), 0
+
+        def count(episodes: int) -> None:
+            nonlocal done
+            done = episodes
+
+        self._note({**about, "episodes": 0, "seconds": 0.0})
+        try:
+            yield count
+        finally:
+            seconds = round(time.monotonic() - started, 1)
+            self._note({**about, "episodes": done, "seconds": seconds})
+
+    def _note(self, effort: dict[str, Any]) -> None:
         with _room(self.path / EFFORT), (self.path / EFFORT).open("a", encoding="utf-8") as lines:
             lines.write(json.dumps(effort) + "\n")
 
     def effort(self) -> dict[str, str]:
         """How long the episodes took, and on which machines, in words."""
-        file = self.path / EFFORT
-        if not file.exists():
+        calls = self._calls()
+        if not calls:
             return {}
-        calls = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
         seconds = sum(c["seconds"] for c in calls)
         return {
             "duration": f"{seconds / 60:.0f} min for {sum(c['episodes'] for c in calls)} episodes "
-            f"and what they need, in {len(calls)} call(s) of the command",
+            f"and what they need, in {sum(c['seconds'] > 0 for c in calls)} call(s) of the command",
             "machine": "; ".join(sorted({c["machine"] for c in calls})),
             "jobs": ", ".join(sorted({f"{c['jobs']} ({c['engine']})" for c in calls})),
             "date": ", ".join(sorted({c["date"] for c in calls})),
         }
+
+    def asked(self) -> list[Asked]:
+        """What the command was called for, each once."""
+        return list(dict.fromkeys(Asked(c["experiment"], c["limit"]) for c in self._calls()))
+
+    def _calls(self) -> list[dict[str, Any]]:
+        file = self.path / EFFORT
+        if not file.exists():
+            return []
+        lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+        return [json.loads(line) for line in lines if line.endswith("\n")]
+
+    def _claim(self) -> None:
+        """See that the folder can be one of results, and make it."""
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.path} cannot be a folder of results: {error}") from error
+        others = [p.name for p in self.path.iterdir() if not p.name.startswith((".", ABOUT))]
+        if others and not (self.path / ABOUT).exists():
+            raise InputError(
+                f"{self.path} is not empty and holds no experiment: give another --out"
+            )
 
     def _check(self, about: About) -> None:
         found, wanted = self.about(), {"kind": KIND, **asdict(about)}

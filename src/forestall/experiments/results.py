@@ -6,17 +6,17 @@ Called by the command line after an experiment, or on its own; calls benchmark a
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from forestall.benchmark.cases import CASE_SETS, cases
 from forestall.benchmark.findings import findings
-from forestall.benchmark.rows import EpisodeRow
 from forestall.benchmark.summary import summary as summarised
 from forestall.benchmark.tables import Table, tables
 from forestall.errors import FileFormatError
 from forestall.experiments.folder import ResultsFolder
+from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
 from forestall.report.experiment_page import write_experiment
 from forestall.report.record import replace_file
@@ -24,39 +24,37 @@ from forestall.report.record import replace_file
 SUMMARY = "summary.json"
 
 STAND_INS = {
-    ("image", "two-tower"): "image (stand-in: our small encoder for CLIP)",
-    ("caption", "listing"): "caption (stand-in: a list of what is seen for a captioner)",
+    ("image", "two-tower"): "image (stand-in: our small encoder)",
+    ("caption", "listing"): "caption (stand-in: a list of what is seen)",
 }
 """(detector, what it works with) → how it is called where people read it."""
 
 
-def present(
-    path: Path, rows: Sequence[EpisodeRow] | None = None
-) -> tuple[dict[str, Any], tuple[Table, ...]]:
+def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
     """Write `summary.json`, tables, figures and the page of a folder of results.
 
     Args:
         path: the folder.
-        rows: of the experiment; all rows of the folder by default.
 
     Raises:
         FileFormatError: it holds no experiment, or no episode.
     """
     folder = ResultsFolder(path)
     about = folder.about()
-    rows = list(folder.rows().values()) if rows is None else rows
+    rows = list(folder.rows().values())
     if not rows:
         raise FileFormatError(f"{path} holds no finished episode yet")
     names = shown_names(about["settings"])
-    expected = [c for of in CASE_SETS for c in cases(of, about["split"], about["rounds"])]
     meta = {
         "split": about["split"],
         "seeds": about["rounds"],
         "version": about["version"],
         "sources": about["sources"],
         "settings": about["settings"],
+        "effort": folder.effort(),
     }
-    data = summarised(rows, meta, expected, names)
+    data = summarised(rows, meta, names=names)
+    data["episodes"]["notes"] += _missing(folder, about, {row.key for row in rows})
     made = tables(data)
     replace_file(path / SUMMARY, (json.dumps(data, indent=1) + "\n").encode())
     links = {
@@ -66,15 +64,33 @@ def present(
     }
     told = {
         "title": f"Experiments on the {about['split']} split",
-        **{k: v for k, v in meta.items() if k != "settings"},
-        **about["settings"],
+        **{k: v for k, v in meta.items() if k not in ("settings", "effort")},
+        **{k: v for k, v in about["settings"].items() if v},
         "episodes": len(rows),
-        **folder.effort(),
+        **meta["effort"],
         "findings": findings(data),
         "names": names,
     }
     write_experiment(path, rows, data, made, told, links)
     return data, made
+
+
+def _missing(folder: ResultsFolder, about: dict[str, Any], found: set[str]) -> list[str]:
+    """What was asked for and is not there, and what was not asked for."""
+    asked = [
+        runs_for(a.experiment, about["split"], about["rounds"], a.limit) for a in folder.asked()
+    ]
+    wanted = {run.key: run for runs in asked for run in runs}
+    lacking = Counter(
+        f"{run.strategy} on {run.case.set}" for key, run in wanted.items() if key not in found
+    )
+    notes = [f"missing: {count} episodes of {what}" for what, count in lacking.items()]
+    for of in CASE_SETS:
+        whole = len(cases(of, about["split"], about["rounds"]))
+        used = len({run.case for run in wanted.values() if run.case.set == of})
+        if 0 < used < whole:
+            notes.append(f"a limit was given: {used} of {whole} cases of {of}")
+    return notes
 
 
 def shown_names(settings: dict[str, Any]) -> dict[str, str]:

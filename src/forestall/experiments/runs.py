@@ -1,7 +1,8 @@
 """Which episodes each experiment consists of.
 
-Called by `conduct`; reads `benchmark.cases`. The unmonitored run of every case is "watch": all
-detectors judge it and none interrupts it, so that they are compared on the same observations.
+Called by `conduct`; reads `benchmark.cases`. In the run "watch" of every case all detectors judge
+and none interrupts, so that they are compared on the same observations. "none" is the same without
+them: the paper's detector sometimes asks for a second look, which takes the robot its time.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class Run:
 def runs_for(
     experiment: str, split: str, rounds: int = 1, limit: int | None = None
 ) -> tuple[Run, ...]:
-    """The episodes of an experiment, each once, the unmonitored run of a case first.
+    """The episodes of an experiment, each once, the watched run of a case first.
 
     Args:
         experiment: one of `EXPERIMENTS`.
@@ -91,11 +92,12 @@ def runs_for(
     if limit is not None and limit < 1:
         raise InputError(f"limit {limit}: at least 1 case of each set is needed")
     sets = {of: _limited(cases(of, split, rounds), limit) for of in CASE_SETS}
-    runs = [Run(c, "watch") for of in CASE_SETS for c in sets[of]]
+    runs = [Run(c, s) for of in CASE_SETS for c in sets[of] for s in ("watch", "none")]
     if experiment in ("proactive", "all"):
         for of in ("irreversible", "robofail"):
             for strategy in ("proactive", "online", "post-hoc"):
                 runs += [Run(c, strategy) for c in sets[of]]
+        runs += [Run(c, "online-scene") for c in sets["irreversible"]]
         runs += [Run(c, "proactive") for of in (UNDISTURBED, "harmless") for c in sets[of]]
     if experiment in ("detection", "all"):
         for detector in (PAPER_DETECTOR, *BASELINES):
@@ -109,11 +111,17 @@ def runs_for(
 
 
 def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
-    """Runs grouped by scene, in the order of the first of each; within a scene as they come."""
-    groups: dict[tuple[str, int], list[Run]] = {}
+    """Runs grouped by scene, in the order of the first of each; within a scene case by case.
+
+    Runs of one case see the most alike; after the undisturbed one come those in the same room.
+    """
+    groups: dict[tuple[str, int], dict[Case, list[Run]]] = {}
     for run in runs:
-        groups.setdefault(run.scene, []).append(run)
-    return list(groups.values())
+        groups.setdefault(run.scene, {}).setdefault(run.case, []).append(run)
+    return [
+        [run for case in sorted(of, key=lambda c: c.set != UNDISTURBED) for run in of[case]]
+        for of in groups.values()
+    ]
 
 
 def _limited(found: Sequence[Case], limit: int | None) -> Sequence[Case]:

@@ -24,7 +24,7 @@ from forestall.report.page import write_page
 from forestall.report.record import RunRecorder
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, SkillStatus
-from forestall.types.verdict import Decision
+from forestall.types.verdict import Decision, ReplanOutcome
 
 PAGES = "episodes"
 """Folder of the episodes' own pages, inside that of an experiment."""
@@ -74,10 +74,11 @@ def run_one(work: Work) -> dict[str, Any]:
     prepared = prepare(config_of(run, work.settings))
     trace = TruthTrace()
     try:
-        record = _record(work, prepared, trace)
+        return _row(run, prepared, _record(work, prepared, trace), trace).to_json()
+    except OSError:
+        raise  # a full or broken disk is no failed episode
     except Exception as error:  # noqa: BLE001 - whatever breaks is one failed episode, and is told
         return broken_row(run, f"{type(error).__name__}: {error}", prepared).to_json()
-    return _row(run, prepared, record, trace).to_json()
 
 
 def broken_row(run: Run, error: str, prepared: Prepared | None = None) -> EpisodeRow:
@@ -114,7 +115,7 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
                 folder,
                 scenario=work.run.case.scenario,
                 strategy=work.run.strategy,
-                page=str(folder / "index.html"),
+                page="index.html",
             )
         )
     record = run_episode(prepared, demonstrations, listeners, memory, trace, _frames())
@@ -150,7 +151,10 @@ def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace)
         refused=sum(e.outcome.status is not SkillStatus.SUCCEEDED for e in record.executed),
         judged=tuple(judged),
         replans=replans(record),
-        planner_calls=sum(b.replan is not None for b in record.boundaries),
+        planner_calls=sum(
+            b.replan is not None and b.replan.outcome is not ReplanOutcome.NOTHING_TO_CHANGE
+            for b in record.boundaries
+        ),
         model_calls=0,
         simulated_s=record.simulated_s,
         compute_s=dict(record.compute_s),

@@ -1,14 +1,15 @@
 """Replanning after a subtask has failed (REFLECT-online, paper, Sec. 4 and Table 1).
 
-Called by the runtime before and after each subtask and at the end of the plan. Retriever, detector,
+Called by the runtime before and after each subtask. Retriever, detector,
 reasoner, replanner and validator come through the constructor, the same as the proactive strategy
-has; what follows an alarm is in `intervention.py`. Only the time differs.
+has; what follows an alarm is in `intervention.py`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked, look_again
@@ -30,7 +31,6 @@ class Online:
       plan, this subtask included, is replanned. Why the controller gave up is not asked.
     - It went through, and the scene after it does not fit the scenes after it in the
       demonstrations: what held there and does not here must change, and the plan goes on behind it.
-    - The plan is finished: its goal is checked on what is seen.
 
     What was wrong before the subtask already is not its outcome: whether a subtask has succeeded is
     another question than whether the next one will. It becomes its outcome when the subtask puts
@@ -105,14 +105,8 @@ class Online:
         return self._intervention.alarm(onward, verdict, diagnosis, clock)
 
     def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
-        """Is the goal reached on what is seen?"""
-        clock = Clock()
-        verdict, diagnosis = self._intervention.check_goal(context, clock)
-        if verdict.decision is Decision.PROCEED:
-            return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
-        if context.may_look:
-            return look_again(verdict, clock, diagnosis.cause)
-        return self._intervention.alarm(context, verdict, diagnosis, clock)
+        """Go on: the outcome of the last subtask has been verified, the goal is not its affair."""
+        return _GO_ON
 
     def _failed(
         self, context: BoundaryContext, status: SkillStatus, clock: Clock
@@ -161,6 +155,19 @@ class Online:
         else:
             cause = f"after {before.subtask} it is not so that {', '.join(map(str, own))}"
         return replace(diagnosis, cause=cause, must_change=own)
+
+
+class OnlineScene(Online):
+    """As `Online`, but whatever is wrong after a subtask counts, whoever did it.
+
+    Shows what the restriction to the outcome is worth: a scene after a subtask is nearly the scene
+    before the next one, so that this strategy sees ahead, too.
+    """
+
+    name = "online-scene"
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **{"inherited": True, **kwargs})
 
 
 def _of_the_receiver(literal: Literal, subtask: Subtask) -> bool:
