@@ -119,6 +119,16 @@ def test_false_alarms_are_counted_by_run_and_by_boundary_apart() -> None:
     assert found["balanced_accuracy_all"].value == pytest.approx((1 + 1 / 3) / 2)
 
 
+def test_a_failing_run_is_told_apart_from_its_twin_by_an_alarm_that_the_twin_has_not() -> None:
+    calm, alarmed = seen(0.95, 0.95, 0.95, 0.95), seen(0.95, 0.5, 0.95, 0.95)
+    rows = [
+        *(failing(k, judged=j) for k, j in enumerate((alarmed, alarmed, calm, alarmed))),
+        *(good(k, judged=j) for k, j in enumerate((calm, alarmed, calm))),
+    ]
+    found = point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))["pairs_apart"]
+    assert (found.count, found.n) == (1, 3)  # the fourth has no twin
+
+
 def test_a_score_at_the_threshold_is_no_alarm() -> None:
     rows = [failing(0, judged=seen(0.9, 0.9))]
     assert point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))["fdr"].count == 0

@@ -1,9 +1,7 @@
 import pytest
 from rows_by_hand import failing, good, judged
 
-from forestall.benchmark.cases import Case
 from forestall.benchmark.intervals import NOTHING
-from forestall.benchmark.metrics import case_of
 from forestall.benchmark.orderings import (
     FAILS,
     HOLDS,
@@ -18,7 +16,6 @@ from forestall.benchmark.orderings import (
 from forestall.benchmark.outcomes import (
     by_setup,
     compared,
-    coverage,
     of_set,
     outcome_metrics,
     prevented,
@@ -105,18 +102,6 @@ def test_strategies_are_compared_on_the_cases_that_both_were_run_on() -> None:
 def test_harm_counts_whatever_the_run_achieved() -> None:
     assert prevented(failing(0, success=False))
     assert not prevented(failing(0, success=True, harmed=("Egg broke",)))
-
-
-def test_what_is_missing_is_said() -> None:
-    rows = irreversible("proactive", 1, 3)
-    expected = [case_of(r) for r in irreversible("proactive", 0, 5)][1:]
-    expected.append(Case("robofail", "make-coffee", "mug-dropped", 20_000))
-    first, second = coverage(by_setup(rows), expected)
-    assert first.note == (
-        "proactive on irreversible: 2 of 4 episodes, and 1 that were not expected"
-    )
-    assert [c.scenario for c in first.missing] == ["irreversible-3", "irreversible-4"]
-    assert (second.found, second.expected, second.whole) == (0, 1, False)
 
 
 def test_an_ordering_holds_fails_or_is_open() -> None:

@@ -17,9 +17,9 @@ from forestall.benchmark.rows import EpisodeRow
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Plan, conduct, implied
 from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder
-from forestall.experiments.runs import Run, Settings, by_scene, runs_for
+from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
 
-SMALL = Plan("proactive", "development", limit=2, workers=2)
+SMALL = Plan(Choice("proactive", "development", limit=2), workers=2)
 
 
 def quiet(done: int, total: int, what: str) -> None:
@@ -51,25 +51,30 @@ def test_splits_share_no_seed_and_every_failing_case_has_its_twin() -> None:
 
 
 def test_all_holds_every_other_experiment_and_each_episode_once() -> None:
-    everything = runs_for("all", "test")
+    everything = runs_for(Choice("all"))
     assert len(set(everything)) == len(everything)
     assert len({r.key for r in everything}) == len(everything)
     for name in ("proactive", "detection", "ablation"):
-        assert set(runs_for(name, "test")) <= set(everything)
+        assert set(runs_for(Choice(name))) <= set(everything)
     with pytest.raises(InputError, match="ablation"):
-        runs_for("ablations", "test")
+        runs_for(Choice("ablations"))
+    some = runs_for(Choice("all", sets=("robofail",), strategies=("proactive",)))
+    assert {(r.case.set, r.strategy) for r in some} == {("robofail", "proactive")}
+    for wrong in (Choice("all", sets=("robofails",)), Choice("all", strategies=("proactve",))):
+        with pytest.raises(InputError, match="did you mean"):
+            runs_for(wrong)
     with pytest.raises(InputError, match="limit"):
-        runs_for("all", "test", limit=0)
+        runs_for(Choice("all", limit=0))
 
 
 def test_a_limit_takes_cases_of_all_tasks_in_turn() -> None:
-    runs = [r for r in runs_for("proactive", "test", limit=10) if r.case.set == "robofail"]
+    runs = [r for r in runs_for(Choice("proactive", limit=10)) if r.case.set == "robofail"]
     assert len({r.case.task for r in runs}) == 10
     assert len({r.case for r in runs}) == 10
 
 
 def test_the_unmonitored_run_of_a_case_comes_first_within_its_scene() -> None:
-    for group in by_scene(runs_for("all", "test", limit=5)):
+    for group in by_scene(runs_for(Choice("all", limit=5))):
         assert len({r.scene for r in group}) == 1
         for run in group:
             assert group.index(Run(run.case, "watch")) <= group.index(run)
@@ -78,7 +83,7 @@ def test_the_unmonitored_run_of_a_case_comes_first_within_its_scene() -> None:
 def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
     whole = play(SMALL, tmp_path / "whole")
     lines = (tmp_path / "whole" / ROWS).read_text().splitlines(keepends=True)
-    assert len(lines) == len(whole) == len(runs_for("proactive", "development", limit=2))
+    assert len(lines) == len(whole) == len(runs_for(SMALL.choice))
     half = tmp_path / "half"
     half.mkdir()
     (half / ABOUT).write_bytes((tmp_path / "whole" / ABOUT).read_bytes())
@@ -96,7 +101,7 @@ def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_path: Path) -> None:
     rows = play(replace(SMALL, workers=1), tmp_path, deadly_row)
     broken = [r for r in rows if r.end == "error"]
-    assert len(rows) == len(runs_for("proactive", "development", limit=2))
+    assert len(rows) == len(runs_for(SMALL.choice))
     assert {r.task for r in broken} == {DEADLY}
     assert all("died" in r.error and not r.success for r in broken)
 
@@ -104,13 +109,28 @@ def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_pat
 def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> None:
     play(SMALL, tmp_path)
     with pytest.raises(InputError, match="split"):
-        play(replace(SMALL, split="test"), tmp_path)
+        play(replace(SMALL, choice=Choice("proactive", limit=2)), tmp_path)
     with pytest.raises(InputError, match="settings"):
         play(replace(SMALL, settings=Settings(states="oracle")), tmp_path)
     about = json.loads((tmp_path / ABOUT).read_text())
     (tmp_path / ABOUT).write_text(json.dumps(about | {"version": "0.0.1"}))
     with pytest.raises(InputError, match=r"version '0\.0\.1'"):
         play(SMALL, tmp_path)
+
+
+def test_two_commands_do_not_write_to_one_folder(tmp_path: Path) -> None:
+    play(SMALL, tmp_path)
+    with ResultsFolder(tmp_path).alone(), pytest.raises(InputError, match="another experiment"):
+        play(SMALL, tmp_path)
+
+
+def test_reading_while_another_writes_takes_nothing_away(tmp_path: Path) -> None:
+    play(SMALL, tmp_path)
+    with (tmp_path / ROWS).open("a") as lines:
+        lines.write('{"format": 1, "set"')
+    before = (tmp_path / ROWS).read_bytes()
+    assert len(ResultsFolder(tmp_path).rows()) == len(runs_for(SMALL.choice))
+    assert (tmp_path / ROWS).read_bytes() == before
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:

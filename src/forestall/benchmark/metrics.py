@@ -244,6 +244,7 @@ def point_metrics(alarms: Sequence[Alarms], failing: str = PAPER_SET) -> dict[st
     harmless = [a for a in alarms if a.row.set == HARMLESS]
     found = detection_metrics(bad)
     found |= false_alarm_metrics(undisturbed, UNDISTURBED) | false_alarm_metrics(harmless, HARMLESS)
+    found["pairs_apart"] = pairs_apart(bad, undisturbed)
     found[f"balanced_accuracy_{UNDISTURBED}"] = balanced_accuracy(bad, undisturbed)
     found["balanced_accuracy_all"] = balanced_accuracy(bad, undisturbed + harmless)
     return found
@@ -286,6 +287,22 @@ def false_alarm_metrics(good: Sequence[Alarms], of: str) -> dict[str, Metric]:
         f"false_alarms_per_boundary_{of}": _per_boundary(good, [a.raised_before() for a in good]),
         f"false_alarms_per_run_{of}": _share([a.share() for a in good], good),
     }
+
+
+def pairs_apart(bad: Sequence[Alarms], undisturbed: Sequence[Alarms]) -> Metric:
+    """Failing runs with an alarm whose undisturbed twin in the same room has none.
+
+    Of a failing run and its twin, which differ in the fault alone, so many are told apart.
+    """
+    twins = {case_of(a.row): a for a in undisturbed}
+    pairs = [(a, twins[twin]) for a in bad if (twin := case_of(a.row).twin) in twins]
+    apart = [
+        float((a.raised.any(axis=1) & ~b.raised.any(axis=1)).mean())
+        if len(a.raised) == len(b.raised)
+        else a.share() * (1 - b.share())
+        for a, b in pairs
+    ]
+    return _share(apart, [a for a, _ in pairs])
 
 
 def balanced_accuracy(bad: Sequence[Alarms], good: Sequence[Alarms]) -> Metric:

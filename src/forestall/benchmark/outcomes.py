@@ -148,57 +148,6 @@ def compared(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Coverage:
-    """How many of the expected episodes of a strategy on a set there are.
-
-    Args:
-        strategy: its name.
-        set: of cases.
-        found: expected and there.
-        expected: how many.
-        missing: the first cases that are not there.
-        unexpected: how many others are there; they are counted in the metrics.
-    """
-
-    strategy: str
-    set: str
-    found: int
-    expected: int
-    missing: tuple[Case, ...] = ()
-    unexpected: int = 0
-
-    @property
-    def whole(self) -> bool:
-        """Whether it is what was expected."""
-        return self.found == self.expected and not self.unexpected
-
-    @property
-    def note(self) -> str:
-        """In words."""
-        text = f"{self.strategy} on {self.set}: {self.found} of {self.expected} episodes"
-        return text + (f", and {self.unexpected} that were not expected" if self.unexpected else "")
-
-
-def coverage(
-    setups: Mapping[str, Runs], expected: Sequence[Case], shown: int = 5
-) -> tuple[Coverage, ...]:
-    """What is there of what was expected, for every strategy and every expected set."""
-    wanted: dict[str, set[Case]] = {}
-    for case in expected:
-        wanted.setdefault(case.set, set()).add(case)
-    found = []
-    for name, runs in setups.items():
-        for of in dict.fromkeys([*wanted, *sets_of(runs)] if expected else []):
-            there = {c for c in runs if c.set == of}
-            asked = wanted.get(of, set())
-            missing = tuple(sorted(asked - there, key=_key)[:shown])
-            found.append(
-                Coverage(name, of, len(asked & there), len(asked), missing, len(there - asked))
-            )
-    return tuple(found)
-
-
 def _name(setup: Setup, groups: Iterable[Setup]) -> str:
     """Short where the strategy was not run with several detectors or thresholds."""
     kin = {(s.detector, s.threshold) for s in groups if s.strategy == setup.strategy}

@@ -24,7 +24,6 @@ from forestall.benchmark.metrics import (
     at_thresholds,
     by_rule,
     canonical,
-    case_of,
     confirmed,
     detection_rates,
     detectors,
@@ -44,7 +43,6 @@ from forestall.benchmark.outcomes import (
     Setup,
     by_setup,
     compared,
-    coverage,
     mean_over,
     of_set,
     outcome_metrics,
@@ -72,7 +70,7 @@ Metrics = dict[str, Metric]
 def summary(
     rows: Iterable[EpisodeRow],
     meta: Mapping[str, Any],
-    expected: Sequence[Case] = (),
+    notes: Sequence[str] = (),
     names: Names | None = None,
 ) -> dict[str, Any]:
     """Summarise an experiment.
@@ -80,7 +78,7 @@ def summary(
     Args:
         rows: its episodes, in any order.
         meta: kept as it is: machine, versions, arguments.
-        expected: the cases that it should consist of; what is missing is said.
+        notes: what is to be said below every table, such as what is missing.
         names: what is shown in place of a detector's name; kept for the tables.
 
     Raises:
@@ -106,7 +104,7 @@ def summary(
         "meta": dict(meta),
         "names": dict(names or {}),
         "intervals": {"level": LEVEL, "resamples": RESAMPLES, "seed": SEED},
-        "episodes": _episodes(found, setups, runs, expected),
+        "episodes": _episodes(found, notes),
         "strategies": strategies,
         "success_over_thresholds": over,
         "paired": _paired(setups),
@@ -252,40 +250,15 @@ def _rates(chosen: Mapping[str, Sequence[Alarms]], of: str) -> dict[str, Metrics
     return found
 
 
-def _episodes(
-    rows: Sequence[EpisodeRow],
-    setups: Mapping[str, Runs],
-    runs: Sequence[EpisodeRow],
-    expected: Sequence[Case],
-) -> dict[str, Any]:
-    everything = {**setups, "watch": {case_of(r): r for r in runs}} if runs else setups
-    covered = coverage(everything, expected)
-    broken = [r for r in rows if r.end == ERROR]
-    notes = [c.note for c in covered if not c.whole and (c.found or c.unexpected)]
-    absent: dict[str, list[str]] = {}
-    for c in covered:
-        if not c.whole and not c.found and not c.unexpected:
-            absent.setdefault(c.strategy, []).append(c.set)
-    if absent:
-        notes.append("not run: " + "; ".join(f"{s} on {', '.join(o)}" for s, o in absent.items()))
+def _episodes(rows: Sequence[EpisodeRow], notes: Sequence[str]) -> dict[str, Any]:
+    broken = sum(r.end == ERROR for r in rows)
     if broken:
-        notes.append(f"{len(broken)} of {len(rows)} episodes broke off; they count as failed")
+        notes = [*notes, f"{broken} of {len(rows)} episodes broke off; they count as failed"]
     return {
         "found": len(rows),
-        "errors": len(broken),
-        "expected_cases": len(set(expected)) if expected else None,
-        "coverage": [
-            {
-                "strategy": c.strategy,
-                "set": c.set,
-                "found": c.found,
-                "expected": c.expected,
-                "unexpected": c.unexpected,
-                "missing": [[m.set, m.task, m.scenario, m.seed] for m in c.missing],
-            }
-            for c in covered
-        ],
-        "notes": notes,
+        "executed": sum(not r.implied for r in rows),
+        "errors": broken,
+        "notes": list(notes),
     }
 
 

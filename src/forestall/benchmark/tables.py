@@ -102,6 +102,7 @@ _FALSE: Columns = tuple(
 _POINT: Columns = (
     *_DETECTED,
     *_FALSE,
+    ("told apart from its undisturbed twin", "pairs_apart", share),
     ("alarms before it could be known, per boundary", "early_alarms_per_boundary", share),
     ("balanced accuracy, undisturbed", f"balanced_accuracy_{UNDISTURBED}", share),
     ("balanced accuracy, all", "balanced_accuracy_all", share),

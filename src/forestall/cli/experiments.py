@@ -30,6 +30,8 @@ class Options:
         seeds: how many scenes each scenario and task gets.
         jobs: how many episodes at once; one for each core by default.
         limit: at most so many cases of each set, from all tasks in turn; for a first look.
+        sets: only cases of these sets: robofail, irreversible, undisturbed, harmless.
+        strategies: only runs of these strategies.
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes) or ray.
         address: of a running Ray cluster; a local one is started by default.
@@ -47,6 +49,8 @@ class Options:
     seeds: int = 1
     jobs: int | None = None
     limit: int | None = None
+    sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
+    strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     out: Path | None = None
     engine: str = "local"
     address: str | None = None
@@ -110,13 +114,17 @@ def _experiment(name: str, options: Options) -> int:
     from forestall.cli.progress import bar
     from forestall.experiments.conduct import Plan, conduct
     from forestall.experiments.results import present
-    from forestall.experiments.runs import Settings
+    from forestall.experiments.runs import Choice, Settings
 
     plan = Plan(
-        name,
-        options.split,
-        options.seeds,
-        options.limit,
+        Choice(
+            name,
+            options.split,
+            options.seeds,
+            options.limit,
+            tuple(options.sets or ()),
+            tuple(options.strategies or ()),
+        ),
         options.jobs if options.jobs is not None else os.cpu_count() or 1,
         options.engine,
         options.address,

@@ -31,6 +31,8 @@ def run(
     encoder: str = "hashed-words",
     renderer: str = "auto",
     threshold: float = 0.9,
+    detector: str = "scene-graph",
+    without: str | None = None,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -39,7 +41,8 @@ def run(
     Args:
         task: a task's name (see `forestall tasks`) or a task file.
         scenario: what goes wrong (see `forestall scenarios`), or a scenario file.
-        strategy: when a run may be interrupted: none, proactive.
+        strategy: when a run may be interrupted: none, proactive, online, post-hoc; watch lets every
+            detector judge and never interrupts.
         seed: of the scene.
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         memory: a demonstration file; the ready-made one by default.
@@ -49,6 +52,8 @@ def run(
         encoder: of texts, for references and node features: hashed-words, two-tower, sentence.
         renderer: auto, embree, rays or gl.
         threshold: alarm when no demonstration reaches this score.
+        detector: scene-graph, objects, caption or image.
+        without: a part to leave out: subtask-node, structure, nodes, edges, reasoning, validation.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
     """
@@ -67,6 +72,8 @@ def run(
         feature=feature,
         encoder=encoder,
         threshold=threshold,
+        detector=detector,
+        without=without,
     )
     prepared = prepare(config)
     name = None if prepared.scenario is None else prepared.scenario.name

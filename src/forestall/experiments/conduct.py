@@ -15,7 +15,15 @@ from forestall.demonstrations import ready_made
 from forestall.errors import InputError, UnknownNameError
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
-from forestall.experiments.runs import PAGES, PAPER_DETECTOR, Run, Settings, by_scene, runs_for
+from forestall.experiments.runs import (
+    PAGES,
+    PAPER_DETECTOR,
+    Choice,
+    Run,
+    Settings,
+    by_scene,
+    runs_for,
+)
 from forestall.experiments.worker import Work, broken_row, run_one
 from forestall.memory.store import open_store
 
@@ -27,20 +35,14 @@ class Plan:
     """What to do and how.
 
     Args:
-        experiment: one of `runs.EXPERIMENTS`.
-        split: "development" or "test".
-        rounds: how many scenes each scenario gets.
-        limit: cases of each set at most.
+        choice: which episodes.
         workers: how many episodes at once.
         engine: "local" or "ray".
         address: of a Ray cluster.
         settings: what is the same for every episode.
     """
 
-    experiment: str
-    split: str = "test"
-    rounds: int = 1
-    limit: int | None = None
+    choice: Choice
     workers: int = 1
     engine: str = "local"
     address: str | None = None
@@ -66,7 +68,7 @@ def conduct(
     Raises:
         InputError: something that does not fit, each with what would be valid.
     """
-    runs = runs_for(plan.experiment, plan.split, plan.rounds, plan.limit)
+    runs = runs_for(plan.choice)
     if plan.workers < 1:
         raise InputError(f"--jobs {plan.workers}: at least 1 is needed")
     if plan.settings.pages not in PAGES:
@@ -76,10 +78,10 @@ def conduct(
             store.required()
     folder = ResultsFolder(out)
     with folder.alone():
-        rows = folder.open(About.now(plan.split, plan.rounds, plan.settings))
+        rows = folder.open(About.now(plan.choice.split, plan.choice.rounds, plan.settings))
         todo = [r for r in runs if r.key not in rows]
         if todo:
-            with folder.effort_of(plan.experiment, plan.limit, plan.workers, plan.engine) as count:
+            with folder.effort_of(plan.choice, plan.workers, plan.engine) as count:
                 (prepare or _demonstrations)(todo, plan, progress)
                 before = len(runs) - len(todo)
                 progress(before, len(runs), "episodes")

@@ -21,7 +21,7 @@ from typing import IO, Any
 import forestall
 from forestall.benchmark.rows import ROW_FORMAT, EpisodeRow
 from forestall.errors import FileFormatError, ForestallError, InputError
-from forestall.experiments.runs import Settings
+from forestall.experiments.runs import Choice, Settings
 from forestall.fingerprint import ROW_MAKING, sources_digest
 from forestall.report.record import replace_file
 
@@ -49,14 +49,6 @@ class About:
         memory = Path(settings.memory).read_bytes() if settings.memory else b""
         digest = sources_digest([hashlib.blake2b(memory).hexdigest()], but=ROW_MAKING)
         return cls(split, rounds, replace(settings, pages=""), sources=digest)
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What the command was called for."""
-
-    experiment: str
-    limit: int | None
 
 
 class ResultsFolder:
@@ -160,15 +152,14 @@ class ResultsFolder:
 
     @contextmanager
     def effort_of(
-        self, experiment: str, limit: int | None, workers: int, engine: str
+        self, choice: Choice, workers: int, engine: str
     ) -> Iterator[Callable[[int], None]]:
         """Write down what a call of the command was for, and at its end what it did and where.
 
         Yields what is to be told how many episodes are done.
         """
         about = {
-            "experiment": experiment,
-            "limit": limit,
+            "choice": asdict(choice),
             "jobs": workers,
             "engine": engine,
             "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.platform()}",
@@ -206,9 +197,20 @@ class ResultsFolder:
             "date": ", ".join(sorted({c["date"] for c in calls})),
         }
 
-    def asked(self) -> list[Asked]:
+    def asked(self) -> list[Choice]:
         """What the command was called for, each once."""
-        return list(dict.fromkeys(Asked(c["experiment"], c["limit"]) for c in self._calls()))
+        choices = [
+            Choice(
+                c["experiment"],
+                c["split"],
+                c["rounds"],
+                c["limit"],
+                tuple(c["sets"]),
+                tuple(c["strategies"]),
+            )
+            for c in (call["choice"] for call in self._calls())
+        ]
+        return list(dict.fromkeys(choices))
 
     def _calls(self) -> list[dict[str, Any]]:
         file = self.path / EFFORT

@@ -53,8 +53,8 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
         "settings": about["settings"],
         "effort": folder.effort(),
     }
-    data = summarised(rows, meta, names=names)
-    data["episodes"]["notes"] += _missing(folder, about, {row.key for row in rows})
+    notes = _missing(folder, about, {row.key for row in rows})
+    data = summarised(rows, meta, notes, names)
     made = tables(data)
     replace_file(path / SUMMARY, (json.dumps(data, indent=1) + "\n").encode())
     links = {
@@ -77,10 +77,7 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
 
 def _missing(folder: ResultsFolder, about: dict[str, Any], found: set[str]) -> list[str]:
     """What was asked for and is not there, and what was not asked for."""
-    asked = [
-        runs_for(a.experiment, about["split"], about["rounds"], a.limit) for a in folder.asked()
-    ]
-    wanted = {run.key: run for runs in asked for run in runs}
+    wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
     lacking = Counter(
         f"{run.strategy} on {run.case.set}" for key, run in wanted.items() if key not in found
     )
@@ -88,8 +85,8 @@ def _missing(folder: ResultsFolder, about: dict[str, Any], found: set[str]) -> l
     for of in CASE_SETS:
         whole = len(cases(of, about["split"], about["rounds"]))
         used = len({run.case for run in wanted.values() if run.case.set == of})
-        if 0 < used < whole:
-            notes.append(f"a limit was given: {used} of {whole} cases of {of}")
+        if used < whole:
+            notes.append(f"asked for: {used} of {whole} cases of {of}")
     return notes
 
 

@@ -14,6 +14,7 @@ from forestall.benchmark.cases import CASE_SETS, UNDISTURBED, Case, cases
 from forestall.benchmark.rows import row_key
 from forestall.errors import InputError, UnknownNameError
 from forestall.parts import STATES, THRESHOLD
+from forestall.registry import load
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "all")
 
@@ -72,42 +73,69 @@ class Run:
         return self.case.task, self.case.seed
 
 
-def runs_for(
-    experiment: str, split: str, rounds: int = 1, limit: int | None = None
-) -> tuple[Run, ...]:
-    """The episodes of an experiment, each once, the watched run of a case first.
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Which episodes are wanted.
 
     Args:
         experiment: one of `EXPERIMENTS`.
         split: "development" or "test".
         rounds: how many scenes each scenario gets.
         limit: cases of each set at most, taken from all tasks in turn; all by default.
+        sets: only cases of these; all by default.
+        strategies: only these; all by default.
+    """
+
+    experiment: str
+    split: str = "test"
+    rounds: int = 1
+    limit: int | None = None
+    sets: tuple[str, ...] = ()
+    strategies: tuple[str, ...] = ()
+
+    def takes(self, run: Run) -> bool:
+        """Whether a run is among the wanted sets and strategies."""
+        of_set = not self.sets or run.case.set in self.sets
+        return of_set and (not self.strategies or run.strategy in self.strategies)
+
+
+def runs_for(choice: Choice) -> tuple[Run, ...]:
+    """The wanted episodes, each once, the watched run of a case first.
 
     Raises:
-        UnknownNameError: no such experiment or split.
+        UnknownNameError: no such experiment, split, set or strategy.
         InputError: a limit below 1.
     """
-    if experiment not in EXPERIMENTS:
-        raise UnknownNameError("experiment", experiment, EXPERIMENTS)
-    if limit is not None and limit < 1:
-        raise InputError(f"limit {limit}: at least 1 case of each set is needed")
-    sets = {of: _limited(cases(of, split, rounds), limit) for of in CASE_SETS}
+    _check(choice)
+    sets = {of: _limited(cases(of, choice.split, choice.rounds), choice.limit) for of in CASE_SETS}
     runs = [Run(c, s) for of in CASE_SETS for c in sets[of] for s in ("watch", "none")]
-    if experiment in ("proactive", "all"):
+    if choice.experiment in ("proactive", "all"):
         for of in ("irreversible", "robofail"):
             for strategy in ("proactive", "online", "post-hoc"):
                 runs += [Run(c, strategy) for c in sets[of]]
         runs += [Run(c, "online-scene") for c in sets["irreversible"]]
         runs += [Run(c, "proactive") for of in (UNDISTURBED, "harmless") for c in sets[of]]
-    if experiment in ("detection", "all"):
+    if choice.experiment in ("detection", "all"):
         for detector in (PAPER_DETECTOR, *BASELINES):
             for threshold in THRESHOLDS:
                 runs += [Run(c, "proactive", detector, threshold) for c in sets["robofail"]]
-    if experiment in ("ablation", "all"):
+    if choice.experiment in ("ablation", "all"):
         runs += [Run(c, "proactive") for c in sets["robofail"]]
         for part in ("reasoning", "validation"):
             runs += [Run(c, "proactive", without=part) for c in sets["robofail"]]
-    return tuple(dict.fromkeys(runs))
+    return tuple(run for run in dict.fromkeys(runs) if choice.takes(run))
+
+
+def _check(choice: Choice) -> None:
+    if choice.experiment not in EXPERIMENTS:
+        raise UnknownNameError("experiment", choice.experiment, EXPERIMENTS)
+    if choice.limit is not None and choice.limit < 1:
+        raise InputError(f"limit {choice.limit}: at least 1 case of each set is needed")
+    for name in choice.sets:
+        if name not in CASE_SETS:
+            raise UnknownNameError("set of cases", name, CASE_SETS)
+    for name in choice.strategies:
+        load("strategy", name)
 
 
 def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
