@@ -7,7 +7,7 @@ import json
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import pytest
 
@@ -15,19 +15,19 @@ from experiments.episodes import DEADLY, computed_row, deadly_row
 from forestall.benchmark.cases import CASE_SETS, Case, cases
 from forestall.benchmark.rows import EpisodeRow
 from forestall.errors import FileFormatError, ForestallError, InputError
-from forestall.experiments.conduct import Plan, conduct, implied
+from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder
 from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
 
-SMALL = Plan(Choice("proactive", "development", limit=2), workers=2)
+SMALL = Experiment(Choice("proactive", "development", limit=2), workers=2)
 
 
 def quiet(done: int, total: int, what: str) -> None:
     """No progress."""
 
 
-def play(plan: Plan, out: Path, compute: object = computed_row) -> list[EpisodeRow]:
-    return conduct(plan, out, quiet, compute, lambda *a: None)  # type: ignore[arg-type]
+def play(experiment: Experiment, out: Path, compute: object = computed_row) -> list[EpisodeRow]:
+    return conduct(experiment, out, quiet, compute, lambda *a: None)  # type: ignore[arg-type]
 
 
 def test_splits_share_no_seed_and_every_failing_case_has_its_twin() -> None:
@@ -131,6 +131,25 @@ def test_reading_while_another_writes_takes_nothing_away(tmp_path: Path) -> None
     before = (tmp_path / ROWS).read_bytes()
     assert len(ResultsFolder(tmp_path).rows()) == len(runs_for(SMALL.choice))
     assert (tmp_path / ROWS).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"workers": 0}, "jobs"),
+        ({"engine": "slurm"}, "local, ray"),
+        ({"settings": Settings(states="learnd")}, "did you mean learned"),
+        ({"settings": Settings(encoder="words")}, "hashed-words"),
+        ({"settings": Settings(pages="every")}, "telling"),
+        ({"settings": Settings(memory="nowhere.db")}, "nowhere.db"),
+    ],
+)
+def test_what_cannot_be_is_said_before_anything_is_run(
+    tmp_path: Path, changes: dict[str, Any], what: str
+) -> None:
+    with pytest.raises(ForestallError, match=what):
+        play(replace(SMALL, **changes), tmp_path / "out", deadly_row)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:

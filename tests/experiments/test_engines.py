@@ -53,7 +53,7 @@ def test_unknown_engines_are_named() -> None:
 
 
 def test_without_ray_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "ray", None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"forestall\[cluster\]"):
         make_lanes("ray", 1)
 

@@ -11,7 +11,7 @@ from experiments.episodes import computed_row
 from forestall.benchmark import intervals
 from forestall.cli.main import call
 from forestall.errors import FileFormatError
-from forestall.experiments.conduct import Plan, conduct
+from forestall.experiments.conduct import Experiment, conduct
 from forestall.experiments.folder import ROWS
 from forestall.experiments.results import SUMMARY, present
 from forestall.experiments.runs import Choice
@@ -26,8 +26,8 @@ def _few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def made(out: Path, workers: int) -> None:
-    plan = Plan(Choice("all", "development", limit=4), workers)
-    conduct(plan, out, lambda *a: None, computed_row, lambda *a: None)
+    experiment = Experiment(Choice("all", "development", limit=4), workers)
+    conduct(experiment, out, lambda *a: None, computed_row, lambda *a: None)
 
 
 def test_tables_do_not_depend_on_how_many_worked(tmp_path: Path) -> None:

@@ -112,11 +112,11 @@ def register(bench: App) -> None:
 
 def _experiment(name: str, options: Options) -> int:
     from forestall.cli.progress import bar
-    from forestall.experiments.conduct import Plan, conduct
+    from forestall.experiments.conduct import Experiment, conduct
     from forestall.experiments.results import present
     from forestall.experiments.runs import Choice, Settings
 
-    plan = Plan(
+    experiment = Experiment(
         Choice(
             name,
             options.split,
@@ -138,7 +138,7 @@ def _experiment(name: str, options: Options) -> int:
     )
     out = options.out or Path("runs") / f"{name}-{options.split}"
     with bar("running", quiet=options.quiet or options.as_json) as feed:
-        conduct(plan, out, feed)
+        conduct(experiment, out, feed)
     return _show(*present(out), out, options.as_json)
 
 

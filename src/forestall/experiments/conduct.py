@@ -1,6 +1,7 @@
-"""Conducts an experiment: demonstrations, episodes, then tables, figures and the page.
+"""Conducts an experiment: everything is checked, demonstrations are made, episodes run.
 
 Calls: command line → here → engines → worker → build. What is in the folder is not run again.
+`results` makes what people look at.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from forestall.benchmark.rows import EpisodeRow
+from forestall.build import prepare
 from forestall.demonstrations import ready_made
 from forestall.errors import InputError, UnknownNameError
-from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
+from forestall.experiments.engines import WorkerDiedError, check_engine, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
 from forestall.experiments.runs import (
     PAGES,
@@ -24,14 +26,14 @@ from forestall.experiments.runs import (
     by_scene,
     runs_for,
 )
-from forestall.experiments.worker import Work, broken_row, run_one
+from forestall.experiments.worker import Work, broken_row, config_of, run_one
 from forestall.memory.store import open_store
 
 Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Experiment:
     """What to do and how.
 
     Args:
@@ -50,59 +52,72 @@ class Plan:
 
 
 def conduct(
-    plan: Plan,
+    experiment: Experiment,
     out: Path,
     progress: Progress,
     compute: Callable[[Work], dict[str, Any]] = run_one,
-    prepare: Callable[[Sequence[Run], Plan, Progress], None] | None = None,
+    demonstrate: Callable[[Sequence[Run], Experiment, Progress], None] | None = None,
 ) -> list[EpisodeRow]:
     """Run what is missing; every row of the experiment in the order of its runs.
 
     Args:
-        plan: what to do.
+        experiment: what to do.
         out: folder of the results.
         progress: told (done, total, what).
         compute: makes a row; called in the workers.
-        prepare: called once before, by default to record the demonstrations that are needed.
+        demonstrate: called once before, by default to record the demonstrations that are needed.
 
     Raises:
         InputError: something that does not fit, each with what would be valid.
     """
-    runs = runs_for(plan.choice)
-    if plan.workers < 1:
-        raise InputError(f"--jobs {plan.workers}: at least 1 is needed")
-    if plan.settings.pages not in PAGES:
-        raise UnknownNameError("pages", plan.settings.pages, PAGES)
-    if plan.settings.memory is not None:
-        with open_store(plan.settings.memory) as store:
-            store.required()
+    runs = runs_for(experiment.choice)
+    _check(experiment, runs)
     folder = ResultsFolder(out)
     with folder.alone():
-        rows = folder.open(About.now(plan.choice.split, plan.choice.rounds, plan.settings))
+        rows = folder.open(
+            About.now(experiment.choice.split, experiment.choice.rounds, experiment.settings)
+        )
         todo = [r for r in runs if r.key not in rows]
         if todo:
-            with folder.effort_of(plan.choice, plan.workers, plan.engine) as count:
-                (prepare or _demonstrations)(todo, plan, progress)
+            with folder.effort_of(
+                experiment.choice, experiment.workers, experiment.engine
+            ) as count:
+                (demonstrate or _demonstrations)(todo, experiment, progress)
                 before = len(runs) - len(todo)
                 progress(before, len(runs), "episodes")
-                for done, row in enumerate(_computed(todo, rows, folder, plan, compute), 1):
+                for done, row in enumerate(_computed(todo, rows, folder, experiment, compute), 1):
                     count(done)
                     progress(before + done, len(runs), row.scenario or row.task)
     return [rows[r.key] for r in runs]
 
 
-def _demonstrations(runs: Sequence[Run], plan: Plan, progress: Progress) -> None:
-    if plan.settings.memory is not None:
+def _check(experiment: Experiment, runs: Sequence[Run]) -> None:
+    """See before anything is run that all of it can be."""
+    if experiment.workers < 1:
+        raise InputError(f"--jobs {experiment.workers}: at least 1 is needed")
+    if experiment.settings.pages not in PAGES:
+        raise UnknownNameError("pages", experiment.settings.pages, PAGES)
+    check_engine(experiment.engine)
+    if experiment.settings.memory is not None:
+        with open_store(experiment.settings.memory) as store:
+            store.required()
+    one_each = {r.case: r for r in runs} | {replace(r, case=runs[0].case): r for r in runs}
+    for run in one_each.values():
+        prepare(config_of(run, experiment.settings))
+
+
+def _demonstrations(runs: Sequence[Run], experiment: Experiment, progress: Progress) -> None:
+    if experiment.settings.memory is not None:
         return
     for task in sorted({r.case.task for r in runs}):
         ready_made(
             task,
-            plan.settings.states,
+            experiment.settings.states,
             progress=progress,
-            workers=plan.workers,
-            feature=plan.settings.feature,
-            image_encoder=plan.settings.image_encoder,
-            captioner=plan.settings.captioner,
+            workers=experiment.workers,
+            feature=experiment.settings.feature,
+            image_encoder=experiment.settings.image_encoder,
+            captioner=experiment.settings.captioner,
         )
 
 
@@ -110,18 +125,18 @@ def _computed(
     todo: Sequence[Run],
     rows: dict[str, EpisodeRow],
     folder: ResultsFolder,
-    plan: Plan,
+    experiment: Experiment,
     compute: Callable[[Work], dict[str, Any]],
 ) -> Iterator[EpisodeRow]:
     """Every missing row, written and put among `rows`, as they come."""
     where = str(folder.path.resolve())
-    groups = [[Work(r, plan.settings, where) for r in group] for group in by_scene(todo)]
+    groups = [[Work(r, experiment.settings, where) for r in group] for group in by_scene(todo)]
 
     def spared(work: Work) -> dict[str, Any] | None:
         row = implied(work.run, rows)
         return None if row is None else row.to_json()
 
-    lanes = make_lanes(plan.engine, min(plan.workers, len(groups)), plan.address)
+    lanes = make_lanes(experiment.engine, min(experiment.workers, len(groups)), experiment.address)
     with folder.writing() as lines:
         for work, answer in computed(groups, lanes, compute, spared):
             row = (
@@ -166,4 +181,4 @@ def implied(run: Run, rows: Mapping[str, EpisodeRow]) -> EpisodeRow | None:
     )
 
 
-__all__ = ["Plan", "conduct", "implied"]
+__all__ = ["Experiment", "conduct", "implied"]

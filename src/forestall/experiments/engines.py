@@ -7,6 +7,7 @@ second death is handed back as the answer to that job alone.
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -104,6 +105,19 @@ class RayLane:
         return self._ray.remote(num_cpus=1)(Worker).remote()
 
 
+def check_engine(engine: str) -> None:
+    """See that an engine is there.
+
+    Raises:
+        UnknownNameError: no such engine.
+        InputError: Ray is not installed.
+    """
+    if engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
+    if engine == "ray" and importlib.util.find_spec("ray") is None:
+        raise InputError("the engine 'ray' needs Ray: pip install 'forestall[cluster]'")
+
+
 def make_lanes(engine: str, workers: int, address: str | None = None) -> list[Lane]:
     """Workers of an engine.
 
@@ -116,16 +130,11 @@ def make_lanes(engine: str, workers: int, address: str | None = None) -> list[La
         UnknownNameError: no such engine.
         InputError: Ray is not installed, or its cluster is not to be reached.
     """
-    if engine not in ENGINES:
-        raise UnknownNameError("engine", engine, ENGINES)
+    check_engine(engine)
     if engine == "local":
         return [LocalLane() for _ in range(workers)]
-    try:
-        import ray
-    except ImportError as error:
-        raise InputError(
-            f"the engine 'ray' needs Ray: pip install 'forestall[cluster]' ({error})"
-        ) from error
+    import ray
+
     if not ray.is_initialized():
         try:
             own: dict[str, Any] = {"num_cpus": workers, "include_dashboard": False}
