@@ -13,7 +13,7 @@ DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 PATH = re.compile(r"`([\w./-]+\.(?:py|md|toml|jsonl?|jinja))`|\]\(([\w./-]+)\)")
 MADE_BY_USERS = {
     "observation.json", "record.json", "boundaries.jsonl", "runs/episodes.jsonl", "ladle-lost.toml",
-    "fetch-ladle.toml",
+    "fetch-ladle.toml", "episodes.jsonl", "experiment.json", "effort.jsonl", "summary.json",
 }  # fmt: skip
 
 

@@ -114,6 +114,7 @@ def prepare(config: RunConfig) -> Prepared:
         try:
             apply_scene_faults(loaded.task.scene, prepared.faults, loaded.vocabulary)
             check_steps(prepared.plan, prepared.faults, loaded.vocabulary)
+            scenario.moments(prepared.plan)
         except InputError as error:
             raise InputError(f"scenario {scenario.name}: {error}") from error
     return prepared

@@ -38,7 +38,8 @@ class UnknownNameError(InputError):
         near = difflib.get_close_matches(name, options, n=3, cutoff=0.6)
         meant = f"did you mean {' or '.join(near)}?" if near else ""
         if not near or len(options) <= 20:
-            meant = f"{meant} known: {', '.join(options) or 'none'}".strip()
+            some = options if len(options) <= 60 else [*options[:8], f"... ({len(options)} in all)"]
+            meant = f"{meant} known: {', '.join(some) or 'none'}".strip()
         super().__init__(f"unknown {kind} {name!r}: {meant}")
         self.kind = kind
         self.name = name

@@ -237,3 +237,29 @@ def test_what_a_scenario_names_is_checked_before_anything_runs(
     path.write_text(f"{head}[[faults]]\n{fault}\n")
     with pytest.raises(InputError, match=says):
         prepare(RunConfig("make-coffee", str(path)))
+
+
+def test_moments_that_the_plan_has_not_are_refused_before_anything_runs(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = """
+name = "mine"
+task = "heat-potato"
+title = "t"
+kind = "dirty"
+cause = "c"
+known = "navigate_to_obj(Potato)"
+effect = "{effect}"
+[[faults]]
+kind = "set_state"
+object = "Plate"
+attribute = "dirty"
+value = "dirty"
+"""
+    for effect, what in (("pick_up(Mug)", "0 time"), ("pick_up(Plate) #3", "2 time")):
+        path.write_text(text.format(effect=effect))
+        with pytest.raises(InputError, match=what):
+            prepare(RunConfig("heat-potato", str(path)))
+    path.write_text(text.format(effect="pick_up(Plate) #2"))
+    prepared = prepare(RunConfig("heat-potato", str(path)))
+    assert prepared.scenario is not None
+    assert prepared.scenario.moments(prepared.plan) == (0, 7)

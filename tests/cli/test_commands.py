@@ -65,7 +65,7 @@ def test_compare_prints_score_and_difference(
         (["run", "heat-potato", "--scenario", "mug-dropped"], "is for the task make-coffee"),
         (
             ["run", "heat-potato", "--strategy", "psychic"],
-            "known: none, online, post-hoc, proactive, watch",
+            "known: none, online, online-scene",
         ),
         (["run", "heat-potato", "--seed", "-1"], "seed -1"),
         (["run", "heat-potato", "--threshold", "2"], "threshold 2"),

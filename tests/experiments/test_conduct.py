@@ -44,7 +44,7 @@ def test_splits_share_no_seed_and_every_failing_case_has_its_twin() -> None:
     assert len(undisturbed) >= 100
     assert len(cases("harmless", "test")) >= 100
     assert len(cases("robofail", "test", rounds=2)) == 200
-    with pytest.raises(InputError, match="rounds"):
+    with pytest.raises(InputError, match="seeds"):
         cases("robofail", "test", rounds=0)
     with pytest.raises(InputError, match="development"):
         cases("robofail", "dev")
@@ -63,6 +63,8 @@ def test_all_holds_every_other_experiment_and_each_episode_once() -> None:
     for wrong in (Choice("all", sets=("robofails",)), Choice("all", strategies=("proactve",))):
         with pytest.raises(InputError, match="did you mean"):
             runs_for(wrong)
+    with pytest.raises(InputError, match="no run of strategy online on undisturbed"):
+        runs_for(Choice("proactive", sets=("undisturbed",), strategies=("online",)))
     with pytest.raises(InputError, match="limit"):
         runs_for(Choice("all", limit=0))
 
@@ -110,7 +112,7 @@ def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> N
     play(SMALL, tmp_path)
     with pytest.raises(InputError, match="split"):
         play(replace(SMALL, choice=Choice("proactive", limit=2)), tmp_path)
-    with pytest.raises(InputError, match="settings"):
+    with pytest.raises(InputError, match="states"):
         play(replace(SMALL, settings=Settings(states="oracle")), tmp_path)
     about = json.loads((tmp_path / ABOUT).read_text())
     (tmp_path / ABOUT).write_text(json.dumps(about | {"version": "0.0.1"}))

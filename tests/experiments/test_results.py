@@ -65,7 +65,7 @@ def test_the_command_makes_the_page_again_and_names_what_is_no_experiment(
     assert call(["bench", "report", str(tmp_path / "made")]) == 0
     assert "index.html" in capsys.readouterr().out
     assert call(["bench", "report", str(tmp_path)]) == 2
-    assert "no experiment" in capsys.readouterr().err
+    assert "holds no experiment" in capsys.readouterr().err
     assert call(["bench", "all", "--split", "tests", "--out", str(tmp_path / "x")]) == 2
     assert "did you mean test" in capsys.readouterr().err
     (tmp_path / "made" / ROWS).write_text("")

@@ -29,6 +29,8 @@ def record(
     seed: int = 1_000_000,
     states: str = "learned",
     feature: str = "parts",
+    image_encoder: str = "two-tower",
+    captioner: str = "listing",
     jobs: int | None = None,
     quiet: Quiet = False,
 ) -> int:
@@ -41,6 +43,8 @@ def record(
         seed: first seed of the demonstration scenes.
         states: where object states come from: learned, clip or oracle.
         feature: "image" keeps the look of every object, for runs with --feature image.
+        image_encoder: of whole pictures, for the detector image: two-tower or clip.
+        captioner: of whole pictures, for the detector caption: listing or blip.
         jobs: how many processes; all cores by default.
         quiet: no progress bar.
     """
@@ -57,7 +61,7 @@ def record(
     names = task or list(task_names())
     for name in names:
         load_task(name)
-    todo = jobs_for(names, kitchens, seed, states, feature)
+    todo = jobs_for(names, kitchens, seed, states, feature, image_encoder, captioner)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:
         count = 0
         for demonstration in record_all(todo, jobs or os.cpu_count() or 1, feed):
@@ -101,7 +105,13 @@ def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
 
 
 def load_memory(
-    memory: Path | None, task: str, states: str, quiet: bool, feature: str = "parts"
+    memory: Path | None,
+    task: str,
+    states: str,
+    quiet: bool,
+    feature: str = "parts",
+    image_encoder: str = "two-tower",
+    captioner: str = "listing",
 ) -> tuple[list[Demonstration], str]:
     """Every demonstration of a memory, and its path.
 
@@ -111,18 +121,22 @@ def load_memory(
         states: where object states come from.
         quiet: no progress on standard error.
         feature: what a node's feature encodes.
+        image_encoder: of whole pictures.
+        captioner: of whole pictures.
 
     Raises:
         MemoryFileError: see `memory.store`.
     """
     from forestall.memory.store import open_store
 
-    path = memory or _ready_made(task, states, quiet, feature)
+    path = memory or _ready_made(task, states, quiet, feature, image_encoder, captioner)
     with open_store(path) as store:
         return list(store.required()), str(path)
 
 
-def _ready_made(task: str, states: str, quiet: bool, feature: str) -> Path:
+def _ready_made(
+    task: str, states: str, quiet: bool, feature: str, image_encoder: str, captioner: str
+) -> Path:
     from forestall.cli.progress import bar
     from forestall.demonstrations import ready_made
 
@@ -130,4 +144,12 @@ def _ready_made(task: str, states: str, quiet: bool, feature: str) -> Path:
         print(f"forestall: {text}", file=sys.stderr)
 
     with bar("recording", quiet=quiet) as feed:
-        return ready_made(task, states, announce, feed, feature=feature)
+        return ready_made(
+            task,
+            states,
+            announce,
+            feed,
+            feature=feature,
+            image_encoder=image_encoder,
+            captioner=captioner,
+        )

@@ -27,11 +27,12 @@ class Options:
 
     Args:
         split: development (to look at and to tune on) or test (to report).
-        seeds: how many scenes each scenario and task gets.
+        seeds: how many scenes each scenario and task gets (a number, not a range).
         jobs: how many episodes at once; one for each core by default.
         limit: at most so many cases of each set, from all tasks in turn; for a first look.
         sets: only cases of these sets: robofail, irreversible, undisturbed, harmless.
-        strategies: only runs of these strategies.
+        strategies: only runs of these: watch (all detectors judge), none, proactive, online,
+            online-scene, post-hoc. Without watch there are no figures of detectors.
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes) or ray.
         address: of a running Ray cluster; a local one is started by default.
@@ -39,6 +40,8 @@ class Options:
         states: where object states come from: learned, clip or oracle.
         feature: what a node's feature encodes: text, parts or image.
         encoder: of texts: hashed-words, two-tower, sentence.
+        image_encoder: of whole pictures, for the detector image: two-tower or clip.
+        captioner: of whole pictures, for the detector caption: listing or blip.
         pages: which episodes get a page of their own (1.5 MB each): all, telling (the proactive
             runs of failing cases, and those with a false alarm) or none.
         as_json: print the summary as JSON instead of tables.
@@ -58,6 +61,8 @@ class Options:
     states: str = "learned"
     feature: str = "parts"
     encoder: str = "hashed-words"
+    image_encoder: str = "two-tower"
+    captioner: str = "listing"
     pages: str = "telling"
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
     quiet: Flag = False
@@ -132,6 +137,8 @@ def _experiment(name: str, options: Options) -> int:
             states=options.states,
             encoder=options.encoder,
             feature=options.feature,
+            image_encoder=options.image_encoder,
+            captioner=options.captioner,
             memory=None if options.memory is None else str(options.memory),
             pages=options.pages,
         ),

@@ -33,6 +33,8 @@ def run(
     threshold: float = 0.9,
     detector: str = "scene-graph",
     without: str | None = None,
+    image_encoder: str = "two-tower",
+    captioner: str = "listing",
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -41,8 +43,8 @@ def run(
     Args:
         task: a task's name (see `forestall tasks`) or a task file.
         scenario: what goes wrong (see `forestall scenarios`), or a scenario file.
-        strategy: when a run may be interrupted: none, proactive, online, post-hoc; watch lets every
-            detector judge and never interrupts.
+        strategy: when a run may be interrupted: none, proactive, online,
+            online-scene, post-hoc; watch lets every detector judge and never interrupts.
         seed: of the scene.
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         memory: a demonstration file; the ready-made one by default.
@@ -52,8 +54,10 @@ def run(
         encoder: of texts, for references and node features: hashed-words, two-tower, sentence.
         renderer: auto, embree, rays or gl.
         threshold: alarm when no demonstration reaches this score.
-        detector: scene-graph, objects, caption or image.
+        detector: of a strategy that steps in: scene-graph, objects, caption or image.
         without: a part to leave out: subtask-node, structure, nodes, edges, reasoning, validation.
+        image_encoder: of whole pictures, for the detector image: two-tower or clip.
+        captioner: of whole pictures, for the detector caption: listing or blip.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
     """
@@ -74,6 +78,8 @@ def run(
         threshold=threshold,
         detector=detector,
         without=without,
+        image_encoder=image_encoder,
+        captioner=captioner,
     )
     prepared = prepare(config)
     name = None if prepared.scenario is None else prepared.scenario.name
@@ -110,7 +116,15 @@ def _memory(
         return None, None
     from forestall.cli.demos import load_memory
 
-    return load_memory(memory, config.task, config.states, quiet, config.feature)
+    return load_memory(
+        memory,
+        config.task,
+        config.states,
+        quiet,
+        config.feature,
+        config.image_encoder,
+        config.captioner,
+    )
 
 
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:

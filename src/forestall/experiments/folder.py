@@ -14,7 +14,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -48,7 +48,7 @@ class About:
         """With the digest of the code at hand, and of the memory if one is given."""
         memory = Path(settings.memory).read_bytes() if settings.memory else b""
         digest = sources_digest([hashlib.blake2b(memory).hexdigest()], but=ROW_MAKING)
-        return cls(split, rounds, replace(settings, pages=""), sources=digest)
+        return cls(split, rounds, settings, sources=digest)
 
 
 class ResultsFolder:
@@ -83,6 +83,9 @@ class ResultsFolder:
             FileFormatError: it holds no experiment.
         """
         file = self.path / ABOUT
+        if not file.exists():
+            what = "holds no experiment" if self.path.is_dir() else "is no folder"
+            raise FileFormatError(f"{self.path} {what}")
         try:
             data = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
@@ -191,7 +194,7 @@ class ResultsFolder:
         seconds = sum(c["seconds"] for c in calls)
         return {
             "duration": f"{seconds / 60:.0f} min for {sum(c['episodes'] for c in calls)} episodes "
-            f"and what they need, in {sum(c['seconds'] > 0 for c in calls)} call(s) of the command",
+            "and their demonstrations, in the calls of the command that came to an end",
             "machine": "; ".join(sorted({c["machine"] for c in calls})),
             "jobs": ", ".join(sorted({f"{c['jobs']} ({c['engine']})" for c in calls})),
             "date": ", ".join(sorted({c["date"] for c in calls})),
@@ -232,7 +235,7 @@ class ResultsFolder:
             )
 
     def _check(self, about: About) -> None:
-        found, wanted = self.about(), {"kind": KIND, **asdict(about)}
+        found, wanted = _flat(self.about()), _flat({"kind": KIND, **asdict(about)})
         for name, value in wanted.items():
             if found.get(name) != value:
                 raise InputError(
@@ -251,6 +254,12 @@ def _room(file: Path) -> Iterator[None]:
             f"{file} cannot be written: {error}. What was finished before is kept; run the same "
             "command again to go on."
         ) from error
+
+
+def _flat(about: dict[str, Any]) -> dict[str, Any]:
+    """With the settings among the other fields, without what changes no episode."""
+    fields = {**about, **about.get("settings", {})}
+    return {k: v for k, v in fields.items() if k not in ("settings", "pages")}
 
 
 def _processor() -> str:

@@ -66,7 +66,8 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
         "title": f"Experiments on the {about['split']} split",
         **{k: v for k, v in meta.items() if k not in ("settings", "effort")},
         **{k: v for k, v in about["settings"].items() if v},
-        "episodes": len(rows),
+        "episodes": f"{len(rows)}, {sum(not r.implied for r in rows)} of them executed, in "
+        f"{sum(sum(r.compute_s.values()) for r in rows) / 3600:.1f} h of one worker",
         **meta["effort"],
         "findings": findings(data),
         "names": names,

@@ -104,7 +104,7 @@ def runs_for(choice: Choice) -> tuple[Run, ...]:
 
     Raises:
         UnknownNameError: no such experiment, split, set or strategy.
-        InputError: a limit below 1.
+        InputError: a limit below 1, or nothing that fits.
     """
     _check(choice)
     sets = {of: _limited(cases(of, choice.split, choice.rounds), choice.limit) for of in CASE_SETS}
@@ -123,14 +123,20 @@ def runs_for(choice: Choice) -> tuple[Run, ...]:
         runs += [Run(c, "proactive") for c in sets["robofail"]]
         for part in ("reasoning", "validation"):
             runs += [Run(c, "proactive", without=part) for c in sets["robofail"]]
-    return tuple(run for run in dict.fromkeys(runs) if choice.takes(run))
+    wanted = tuple(run for run in dict.fromkeys(runs) if choice.takes(run))
+    if not wanted:
+        raise InputError(
+            f"the experiment {choice.experiment} has no run of strategy "
+            f"{' or '.join(choice.strategies)} on {' or '.join(choice.sets) or 'any set'}"
+        )
+    return wanted
 
 
 def _check(choice: Choice) -> None:
     if choice.experiment not in EXPERIMENTS:
         raise UnknownNameError("experiment", choice.experiment, EXPERIMENTS)
     if choice.limit is not None and choice.limit < 1:
-        raise InputError(f"limit {choice.limit}: at least 1 case of each set is needed")
+        raise InputError(f"--limit {choice.limit}: at least 1 case of each set is needed")
     for name in choice.sets:
         if name not in CASE_SETS:
             raise UnknownNameError("set of cases", name, CASE_SETS)
