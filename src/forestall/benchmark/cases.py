@@ -65,7 +65,9 @@ def cases(of: str, split: str, rounds: int = 1) -> tuple[Case, ...]:
     if split not in SPLITS:
         raise UnknownNameError("split", split, SPLITS)
     if not 1 <= rounds <= SPLITS["development"] // ROUND:
-        raise InputError(f"{rounds} seeds for each scenario: 1 to {SPLITS['development'] // ROUND} are possible")
+        raise InputError(
+            f"{rounds} seeds for each scenario: 1 to {SPLITS['development'] // ROUND} are possible"
+        )
     starts = [SPLITS[split] + ROUND * r for r in range(rounds)]
     found = []
     for task in task_names():

@@ -157,11 +157,13 @@ def _strategies(summary: Summary) -> Iterator[str]:
                 f"{share(runs[NO_STRATEGY]['weak_success'])}."
             )
         if PROACTIVE in runs and ONLINE in runs:
-            a, b = (runs[n]["simulated_s"]["value"] for n in (PROACTIVE, ONLINE))
-            if a is not None and b is not None and a > b:
+            times = [runs[n]["simulated_s"] for n in (PROACTIVE, ONLINE)]
+            a, b = (t["value"] for t in times)
+            same = times[0]["n"] == times[1]["n"]
+            if same and a is not None and b is not None and a > b:
                 yield (
                     f"{of}: the proactive runs take longer than the online ones ({a:.0f} against "
-                    f"{b:.0f} s of robot time)."
+                    f"{b:.0f} s of robot time); a run that is stopped early is a short one."
                 )
     for of, pair in summary["paired"].get(PROACTIVE, {}).items():
         if of in ("undisturbed", "harmless"):
