@@ -110,11 +110,10 @@ def runs_for(choice: Choice) -> tuple[Run, ...]:
     sets = {of: _limited(cases(of, choice.split, choice.rounds), choice.limit) for of in CASE_SETS}
     runs = [Run(c, s) for of in CASE_SETS for c in sets[of] for s in ("watch", "none")]
     if choice.experiment in ("proactive", "all"):
-        for of in ("irreversible", "robofail"):
-            for strategy in ("proactive", "online", "post-hoc"):
-                runs += [Run(c, strategy) for c in sets[of]]
-        runs += [Run(c, "online-scene") for c in sets["irreversible"]]
-        runs += [Run(c, "proactive") for of in (UNDISTURBED, "harmless") for c in sets[of]]
+        for strategy in ("proactive", "online", "online-scene", "post-hoc"):
+            runs += [Run(c, strategy) for c in sets["irreversible"]]
+        for of in ("robofail", UNDISTURBED, "harmless"):
+            runs += [Run(c, "proactive") for c in sets[of]]
     if choice.experiment in ("detection", "all"):
         for detector in (PAPER_DETECTOR, *BASELINES):
             for threshold in THRESHOLDS:
