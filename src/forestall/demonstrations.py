@@ -6,8 +6,6 @@ which runs and surveys refuse.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -20,7 +18,7 @@ from forestall.benchmark.files import load_task
 from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.errors import ForestallError
-from forestall.fingerprint import PRESENTATION
+from forestall.fingerprint import sources_digest
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
 from forestall.parts import make_viewer
@@ -197,18 +195,10 @@ def ready_made(
 
 
 def _key(task: str, states: str, feature: str, image_encoder: str, captioner: str) -> str:
-    digest = hashlib.blake2b(digest_size=8)
     parts = [forestall.__version__, states, feature, KITCHENS_PER_TASK, repr(load_task(task))]
     parts += [image_encoder, captioner]
     if "clip" in (states, image_encoder):
         parts.append(os.environ.get("FORESTALL_CLIP"))
     if captioner == "blip":
         parts.append(os.environ.get("FORESTALL_BLIP"))
-    digest.update(json.dumps(parts).encode())
-    root = Path(forestall.__file__).parent
-    models = (root / "data" / "encoder").glob("*")
-    for path in sorted((*root.rglob("*.py"), *models)):
-        if path.relative_to(root).parts[0] not in PRESENTATION:
-            digest.update(path.relative_to(root).as_posix().encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
+    return sources_digest(parts)

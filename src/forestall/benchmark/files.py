@@ -14,12 +14,20 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from forestall.attributes import parse_attribute
 from forestall.benchmark.faults import Fault
+from forestall.benchmark.schemas import (
+    GoalFile,
+    ScenarioFields,
+    ScenarioFile,
+    ScenarioSetFile,
+    SceneFile,
+    TaskFile,
+)
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.types.facts import DERIVED, RELATIONS, category_of, is_instance
 from forestall.types.facts import Literal as Fact
@@ -35,89 +43,6 @@ END = "end"
 """The moment after the last step of a plan."""
 
 M = TypeVar("M", bound=BaseModel)
-_NAME = r"^[a-z0-9]+(-[a-z0-9]+)*$"
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class GoalFile(_Model):
-    """The goal table: what must hold in the end, and what must never have happened."""
-
-    text: str
-    variables: dict[str, str] = Field(default_factory=dict)
-    all: list[str] = Field(min_length=1)
-    never: list[str] = Field(default_factory=list)
-    weak: list[str] = Field(default_factory=list)
-
-
-class ObjectFile(_Model):
-    """One object that the scene must hold."""
-
-    category: str
-    id: str | None = None
-    places: list[str] = Field(default_factory=list)
-    states: dict[str, str] = Field(default_factory=dict)
-    in_front_of: str | None = None
-
-
-class SceneFile(_Model):
-    """The scene table."""
-
-    room: Literal["kitchen", "living-room"] = "kitchen"
-    clutter: tuple[int, int] = (2, 6)
-    objects: list[ObjectFile] = Field(default_factory=list)
-    fixtures: dict[str, dict[str, str]] = Field(default_factory=dict)
-
-
-class AttributeFile(_Model):
-    """A new attribute, or other phrases for a known one; `parse_attribute` checks what it says."""
-
-    model_config = ConfigDict(
-        extra="allow", frozen=True, json_schema_extra={"additionalProperties": False}
-    )
-
-    values: list[str] | None = None
-    phrases: dict[str, list[str]] | None = None
-    camera: bool | None = None
-    by_category: dict[str, dict[str, list[str]]] | None = None
-
-
-class TaskFile(_Model):
-    """A task file."""
-
-    name: str = Field(pattern=_NAME)
-    title: str
-    plan: list[str] = Field(min_length=1)
-    goal: GoalFile
-    scene: SceneFile = SceneFile()
-    attributes: dict[str, AttributeFile] = Field(default_factory=dict)
-    categories: dict[str, dict[str, Any]] = Field(default_factory=dict)
-
-
-class _ScenarioFields(_Model):
-    name: str = Field(pattern=_NAME)
-    title: str
-    kind: str
-    cause: str
-    source: str = ""
-    known: str | None = None
-    effect: str | None = None
-    faults: list[Fault] = Field(min_length=1)
-
-
-class ScenarioFile(_ScenarioFields):
-    """A scenario file: a task with faults."""
-
-    task: str
-
-
-class ScenarioSetFile(_Model):
-    """Several scenarios of one task; the folder that it lies in names their set."""
-
-    task: str
-    scenarios: list[_ScenarioFields] = Field(min_length=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +170,7 @@ def _scenarios() -> Mapping[str, Scenario]:
     return found
 
 
-def _scenario(data: _ScenarioFields, task: str, set_name: str) -> Scenario:
+def _scenario(data: ScenarioFields, task: str, set_name: str) -> Scenario:
     return Scenario(
         data.name,
         task,

@@ -144,7 +144,9 @@ class ResultsFolder:
     @contextmanager
     def writing(self) -> Iterator[IO[str]]:
         """The open file of rows; hand it to `add`."""
-        with _room(self.path / ROWS), (self.path / ROWS).open("a", encoding="utf-8") as lines:
+        with _room(self.path / ROWS):
+            lines = (self.path / ROWS).open("a", encoding="utf-8")
+        with lines:
             yield lines
 
     def add(self, lines: IO[str], row: EpisodeRow) -> None:

@@ -11,15 +11,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from forestall.benchmark.cases import CASE_SETS, UNDISTURBED, Case, cases
+from forestall.benchmark.metrics import THRESHOLDS
 from forestall.benchmark.rows import row_key
 from forestall.errors import InputError, UnknownNameError
 from forestall.parts import STATES, THRESHOLD
 from forestall.registry import load
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "all")
-
-THRESHOLDS = (0.90, 0.85, 0.80)
-"""The paper's (Sec. 4 "Analysis of Potential Failure Detection")."""
 
 PAGES = ("all", "telling", "none")
 """Telling are the proactive runs of failing cases, and those in which it raised a false alarm."""

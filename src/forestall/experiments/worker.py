@@ -19,7 +19,7 @@ from forestall.demonstrations import ready_made
 from forestall.envs.kitchen.rendering import FrameMemory
 from forestall.experiments.runs import Run, Settings
 from forestall.memory.store import open_store
-from forestall.report.derived import alarms, reasoning_s, replans
+from forestall.report.derived import adopted, alarms, reasoning_s, replans
 from forestall.report.page import write_page
 from forestall.report.record import RunRecorder
 from forestall.types.demonstration import Demonstration
@@ -195,7 +195,7 @@ def _same(a: BoundaryRecord, b: BoundaryRecord) -> bool:
 def _judged(
     boundary: BoundaryRecord, record: EpisodeRecord, possible: bool, reachable: bool
 ) -> Judged:
-    verdict, diagnosis, replan = boundary.verdict, boundary.diagnosis, boundary.replan
+    verdict, diagnosis = boundary.verdict, boundary.diagnosis
     decision = Decision.PROCEED if verdict is None else verdict.decision
     if decision is Decision.LOOK_AGAIN:
         decision = Decision.REPLAN  # the last look, and it still does not fit
@@ -207,7 +207,7 @@ def _judged(
         score=None if verdict is None else verdict.score,
         decision=decision.value,
         confirmed=diagnosis is not None and bool(diagnosis.must_change),
-        replanned=replan is not None and replan.plan is not None and record.strategy != "watch",
+        replanned=adopted(boundary, record.executed) is not None,
         cause="" if diagnosis is None else diagnosis.cause,
         looks=boundary.looks,
         scores={v.detector: v.score for v in boundary.watched},
