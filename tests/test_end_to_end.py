@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from forestall.benchmark.faults import apply_scene_faults
-from forestall.benchmark.files import load_scenario, load_task, scenario_names
 from forestall.cli.main import call
-from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.memory.store import open_store
 from forestall.perception.folder import write_observation
-from forestall.report.record import read_record
+from forestall.records.record import read_record
+from forestall.tasks.faults import apply_scene_faults
+from forestall.tasks.files import load_scenario, load_task, scenario_names
+from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 pytestmark = pytest.mark.slow
 

@@ -10,12 +10,7 @@ from functools import cache
 
 import pytest
 
-from forestall.benchmark.faults import apply_plan_faults, apply_scene_faults, wrap
-from forestall.benchmark.files import load_scenario, load_task, scenario_names, task_names
-from forestall.benchmark.goals import TruthGoalChecker
 from forestall.build import RunConfig
-from forestall.envs.kitchen.environment import KitchenEnvironment
-from forestall.envs.kitchen.flat_world import flat_environment
 from forestall.errors import PerceptionError
 from forestall.memory.recording import demonstration_from
 from forestall.parts import make_strategy
@@ -23,6 +18,9 @@ from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.runtime import Runtime, RuntimeConfig
 from forestall.strategies.none import NoReplanning
+from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, wrap
+from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
+from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import (
     BoundaryRecord,
@@ -37,6 +35,8 @@ from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.verdict import Decision, ReplanOutcome
 from forestall.vocabulary import Vocabulary
+from forestall.worlds.kitchen.environment import KitchenEnvironment
+from forestall.worlds.kitchen.flat_world import flat_environment
 
 ON_FLAT_WORLDS = sorted(set(scenario_names("examples")) - {"knife-blocked"})
 """A flat world knows no place in front of another, so nothing can be moved out of the way there."""

@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forestall.benchmark.files import LoadedTask, load_task
 from forestall.build import RunConfig
 from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import ScoreConfig
 from forestall.comparison.preconditions import mine
 from forestall.embeddings.hashed import HashedTextEncoder
-from forestall.envs.kitchen.flat_world import flat_environment
 from forestall.memory.recording import demonstration_from
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.oracle import OracleStateEstimator
@@ -22,12 +20,14 @@ from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks
 from forestall.planning.domain import State, apply
 from forestall.planning.validate import GraphValidator
+from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.demonstration import Demonstration
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, GripperState, Intrinsics, Observation
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Goal
 from forestall.types.verdict import Decision, Reference, ReplanOutcome
+from forestall.worlds.kitchen.flat_world import flat_environment
 from test_runtime import play
 
 TASK = """

@@ -15,22 +15,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import forestall
-from forestall.benchmark.faults import (
-    Fault,
-    apply_plan_faults,
-    apply_scene_faults,
-    check_steps,
-    wrap,
-)
-from forestall.benchmark.files import LoadedTask, Scenario, load_scenario, load_task
-from forestall.benchmark.goals import TruthGoalChecker, irreversible
-from forestall.benchmark.truth import TruthTrace
 from forestall.comparison.preconditions import MiningConfig
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
-from forestall.envs.kitchen.environment import KitchenEnvironment
-from forestall.envs.kitchen.rendering import RENDERERS, FrameMemory
 from forestall.errors import InputError, UnknownNameError
-from forestall.interfaces import Listener
 from forestall.memory.retrieval import RetrievalConfig
 from forestall.parts import (
     STATES,
@@ -46,10 +33,23 @@ from forestall.perception.perceiver import GraphPerceiver
 from forestall.planning.search import SearchConfig
 from forestall.registry import known, load
 from forestall.runtime import Runtime, RuntimeConfig
+from forestall.seams import Listener
+from forestall.tasks.faults import (
+    Fault,
+    apply_plan_faults,
+    apply_scene_faults,
+    check_steps,
+    wrap,
+)
+from forestall.tasks.files import LoadedTask, Scenario, load_scenario, load_task
+from forestall.tasks.goals import TruthGoalChecker, irreversible
+from forestall.tasks.truth import TruthTrace
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Plan
 from forestall.vocabulary import Vocabulary
+from forestall.worlds.kitchen.environment import KitchenEnvironment
+from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
 
 __all__ = ["RUN_STATES", "STATES", "Prepared", "RunConfig", "prepare", "provenance", "run_episode"]
 

@@ -14,7 +14,6 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import forestall
-from forestall.benchmark.files import load_task
 from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.errors import ForestallError
@@ -22,6 +21,7 @@ from forestall.fingerprint import sources_digest
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
 from forestall.parts import make_viewer
+from forestall.tasks.files import load_task
 from forestall.types.demonstration import Demonstration
 
 KITCHENS_PER_TASK = 4

@@ -12,7 +12,7 @@ PRESENTATION = ("cli", "report", "training", "experiments")
 """Packages that show results or train models, and change no run."""
 
 ROW_MAKING = (
-    "experiments/conduct.py", "experiments/runs.py", "experiments/worker.py", "report/derived.py",
+    "experiments/conduct.py", "experiments/runs.py", "experiments/worker.py", "records/derived.py",
 )  # fmt: skip
 """What makes the rows of an experiment from its runs all the same."""
 
@@ -20,7 +20,7 @@ COUNTING = (
     "cells", "findings", "intervals", "metrics", "orderings", "outcomes", "paper", "summary",
     "sweep", "tables",
 )  # fmt: skip
-"""Modules of the benchmark that count what was run."""
+"""Modules of the statistics that count what was run."""
 
 
 def sources_digest(extra: Sequence[object] = (), but: Sequence[str] = ()) -> str:
@@ -35,7 +35,7 @@ def sources_digest(extra: Sequence[object] = (), but: Sequence[str] = ()) -> str
         p for p in _ROOT.rglob("*") if p.suffix in (".py", ".toml", ".onnx", ".json")
     ):
         place = path.relative_to(_ROOT)
-        counting = place.parts[0] == "benchmark" and place.stem in COUNTING
+        counting = place.parts[0] == "statistics" and place.stem in COUNTING
         shows = place.parts[0] in PRESENTATION and place.as_posix() not in but
         if not shows and not counting:
             digest.update(place.as_posix().encode())

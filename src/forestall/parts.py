@@ -17,7 +17,13 @@ from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.embeddings.views import view_of
 from forestall.errors import InputError, UnknownNameError
-from forestall.interfaces import (
+from forestall.memory.retrieval import EmbeddingRetriever
+from forestall.perception.config import ScopeConfig
+from forestall.perception.scope import scope
+from forestall.planning.validate import AcceptAll, GraphValidator
+from forestall.registry import known, load
+from forestall.replanning.symbolic import PlannerReplanner
+from forestall.seams import (
     Captioner,
     Detector,
     ImageTextEncoder,
@@ -27,12 +33,6 @@ from forestall.interfaces import (
     StateEstimator,
     Strategy,
 )
-from forestall.memory.retrieval import EmbeddingRetriever
-from forestall.perception.config import ScopeConfig
-from forestall.perception.scope import scope
-from forestall.planning.validate import AcceptAll, GraphValidator
-from forestall.registry import known, load
-from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
 from forestall.vocabulary import Vocabulary

@@ -33,7 +33,7 @@ from forestall.types.verdict import Decision
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from forestall.interfaces import Environment, Listener, Perceiver, Strategy
+    from forestall.seams import Environment, Listener, Perceiver, Strategy
     from forestall.vocabulary import Vocabulary
 
 Score = Callable[[EpisodeRecord], EpisodeRecord]

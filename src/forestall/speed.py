@@ -14,22 +14,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from forestall.benchmark.files import load_task
 from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.comparison.timing import score_times
 from forestall.demonstrations import ready_made
-from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.memory.store import open_store
 from forestall.parts import make_state_estimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.symbolic import PlannerReplanner
+from forestall.tasks.files import load_task
 from forestall.types.episode import EpisodeRecord
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis
+from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 Progress = Callable[[int, int, str], None]
 

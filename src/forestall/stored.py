@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from forestall.benchmark.files import load_task
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.embeddings.hashed import HashedTextEncoder
@@ -21,6 +20,7 @@ from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks
 from forestall.registry import known
+from forestall.tasks.files import load_task
 from forestall.types.demonstration import Demonstration
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask

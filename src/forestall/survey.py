@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import forestall
-from forestall.benchmark.files import load_scenario
 from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.demonstrations import ready_made
 from forestall.errors import FileFormatError, InputError
 from forestall.memory.store import open_store
-from forestall.report.as_json import record_json
-from forestall.report.record import replace_file
+from forestall.records.as_json import record_json
+from forestall.records.record import replace_file
+from forestall.tasks.files import load_scenario
 from forestall.types.demonstration import Demonstration
 
 Progress = Callable[[int, int, str], None]

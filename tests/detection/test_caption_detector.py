@@ -11,7 +11,7 @@ from forestall.embeddings.captions import ListingCaptioner
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.embeddings.views import caption_rows, view_of
 from forestall.errors import InputError
-from forestall.interfaces import Detector
+from forestall.seams import Detector
 from forestall.types.demonstration import View
 from forestall.types.graph import Relation
 from forestall.types.verdict import Decision

@@ -7,7 +7,7 @@ from forestall.detection.image import ImageDetector
 from forestall.detection.scene_graph import DetectorConfig
 from forestall.embeddings.views import image_feature, view_of
 from forestall.errors import InputError
-from forestall.interfaces import Detector
+from forestall.seams import Detector
 from forestall.types.demonstration import View
 from forestall.types.verdict import Calibration, Decision
 

@@ -5,7 +5,7 @@ from baseline_samples import graph, node, observation, reference
 
 from forestall.detection.objects import ObjectCountDetector, counts
 from forestall.detection.scene_graph import DetectorConfig
-from forestall.interfaces import Detector
+from forestall.seams import Detector
 from forestall.types.graph import ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.verdict import Decision
 

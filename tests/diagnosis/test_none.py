@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from forestall.diagnosis.none import NoReasoning
-from forestall.interfaces import Reasoner
 from forestall.planning.validate import AcceptAll, GraphValidator, observed
 from forestall.replanning.anew import GoalReplanner
+from forestall.seams import Reasoner
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan

@@ -14,7 +14,7 @@ from PIL import Image
 
 from forestall.embeddings.captioner import BlipCaptioner
 from forestall.errors import InputError, ModelFileError
-from forestall.interfaces import Captioner
+from forestall.seams import Captioner
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from forestall.embeddings.captions import ListingCaptioner
 from forestall.embeddings.views import sentences
-from forestall.interfaces import Captioner
+from forestall.seams import Captioner
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation

@@ -6,8 +6,8 @@ import os
 from dataclasses import replace
 from typing import Any
 
-from forestall.benchmark.rows import EpisodeRow, Judged
 from forestall.experiments.worker import Work, broken_row
+from forestall.statistics.rows import EpisodeRow, Judged
 
 DEADLY = "boil-water"
 """The task whose episodes end their worker."""

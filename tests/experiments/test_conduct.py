@@ -12,12 +12,12 @@ from typing import IO, Any
 import pytest
 
 from experiments.episodes import DEADLY, computed_row, deadly_row
-from forestall.benchmark.cases import CASE_SETS, Case, cases
-from forestall.benchmark.rows import EpisodeRow
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder
 from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
+from forestall.statistics.cases import CASE_SETS, Case, cases
+from forestall.statistics.rows import EpisodeRow
 
 SMALL = Experiment(Choice("proactive", "development", limit=2), workers=2)
 

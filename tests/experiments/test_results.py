@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from experiments.episodes import computed_row
-from forestall.benchmark import intervals
 from forestall.cli.main import call
 from forestall.errors import FileFormatError
 from forestall.experiments.conduct import Experiment, conduct
 from forestall.experiments.folder import ROWS
 from forestall.experiments.results import SUMMARY, present
 from forestall.experiments.runs import Choice
+from forestall.statistics import intervals
 
 
 @pytest.fixture(autouse=True)

@@ -10,10 +10,10 @@ import numpy.typing as npt
 import pytest
 
 from forestall.errors import PerceptionError
-from forestall.interfaces import ImageEncoder
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
+from forestall.seams import ImageEncoder
 from forestall.types.feature import quantised
 from forestall.types.graph import Seen
 from forestall.types.observation import Frame, Mask, Rgb

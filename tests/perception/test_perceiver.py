@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from forestall.errors import PerceptionError
-from forestall.interfaces import Perceiver, Segmenter, StateEstimator
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.given import GivenStateEstimator
@@ -21,6 +20,7 @@ from forestall.perception.support import parents
 from forestall.perception.timing import perception_times
 from forestall.perception.unproject import clouds, label_image
 from forestall.registry import load
+from forestall.seams import Perceiver, Segmenter, StateEstimator
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask

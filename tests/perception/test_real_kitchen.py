@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from forestall.envs.kitchen.environment import KitchenEnvironment
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
@@ -15,6 +14,7 @@ from forestall.types.observation import Intrinsics, Observation
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.vocabulary import household
+from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 NEEDS = SceneNeeds(
     objects=(

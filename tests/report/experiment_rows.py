@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from forestall.benchmark.rows import EpisodeRow, Judged
+from forestall.statistics.rows import EpisodeRow, Judged
 
 KINDS = {
     "drop": "after",

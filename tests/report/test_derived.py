@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from forestall.report.derived import (
+from forestall.records.derived import (
     Mark,
     RowKind,
     done_before,

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from forestall.benchmark import intervals
-from forestall.benchmark.rows import EpisodeRow
-from forestall.benchmark.summary import summary
-from forestall.benchmark.tables import tables
 from forestall.report import figure_data
 from forestall.report.experiment_page import write_experiment
+from forestall.statistics import intervals
+from forestall.statistics.rows import EpisodeRow
+from forestall.statistics.summary import summary
+from forestall.statistics.tables import tables
 
 from .experiment_rows import case_rows, experiment
 from .test_page import Page

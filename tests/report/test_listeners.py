@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from forestall.interfaces import Listener
-from forestall.report.listeners import ProgressLine
+from forestall.records.listeners import ProgressLine
+from forestall.seams import Listener
 from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.runtime import StrategyAnswer, When
 from forestall.types.verdict import Decision

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from forestall.errors import FileFormatError, InputError
-from forestall.interfaces import Listener
-from forestall.report.as_json import RECORD_FORMAT, plain, record_json
-from forestall.report.record import (
+from forestall.records.as_json import RECORD_FORMAT, plain, record_json
+from forestall.records.record import (
     LINES_NAME,
     RECORD_NAME,
     RunRecorder,
     read_record,
     write_record,
 )
+from forestall.seams import Listener
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.graph import SceneGraph
 from forestall.types.runtime import When

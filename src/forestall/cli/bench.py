@@ -96,10 +96,10 @@ def episodes(
         as_json: print JSON instead of the table.
         quiet: no progress on standard error.
     """
-    from forestall.benchmark.files import SETS, scenario_names, task_names
     from forestall.cli.progress import bar
     from forestall.errors import InputError
     from forestall.survey import jobs_for, parse_seeds, survey, table
+    from forestall.tasks.files import SETS, scenario_names, task_names
 
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs {jobs}: at least 1 is needed")

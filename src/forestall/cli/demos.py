@@ -48,11 +48,11 @@ def record(
         jobs: how many processes; all cores by default.
         quiet: no progress bar.
     """
-    from forestall.benchmark.files import load_task, task_names
     from forestall.cli.progress import bar
     from forestall.demonstrations import jobs_for, record_all
     from forestall.errors import InputError
     from forestall.memory.store import open_store
+    from forestall.tasks.files import load_task, task_names
 
     if kitchens < 1:
         raise InputError(f"--kitchens {kitchens}: at least 1 is needed")

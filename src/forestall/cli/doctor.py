@@ -48,9 +48,9 @@ def _needed() -> list[dict[str, Any]]:
     from pathlib import Path
 
     from forestall.config import cache_dir
-    from forestall.envs.kitchen.rendering.probe import probe_renderers
     from forestall.errors import ForestallError
     from forestall.memory.store import open_store
+    from forestall.worlds.kitchen.rendering.probe import probe_renderers
 
     probes = {p.name: p for p in probe_renderers()}
     picture = [p for n, p in probes.items() if n != "gl" and p.works]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 if TYPE_CHECKING:
-    from forestall.benchmark.tables import Table
+    from forestall.statistics.tables import Table
 
 MAIN_TABLES = ("paper",)
 """Printed; all of them are in the folder."""

@@ -18,7 +18,7 @@ def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
         as_json: print them as JSON, complete.
         schema: print the JSON schema of task files instead.
     """
-    from forestall.benchmark.files import load_task, schemas, task_names
+    from forestall.tasks.files import load_task, schemas, task_names
 
     if schema:
         print(json.dumps(schemas()["task"], indent=2))
@@ -60,7 +60,7 @@ def scenarios(
         as_json: print them as JSON, complete.
         schema: print the JSON schema of scenario files instead.
     """
-    from forestall.benchmark.files import load_scenario, load_task, scenario_names, schemas
+    from forestall.tasks.files import load_scenario, load_task, scenario_names, schemas
 
     if schema:
         print(json.dumps(schemas()["scenario"], indent=2))

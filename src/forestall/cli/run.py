@@ -62,9 +62,9 @@ def run(
         quiet: no progress on standard error.
     """
     from forestall.build import RunConfig, prepare, provenance, run_episode
-    from forestall.report.listeners import ProgressLine
+    from forestall.records.listeners import ProgressLine
+    from forestall.records.record import RECORD_NAME, RunRecorder, read_record
     from forestall.report.page import write_page
-    from forestall.report.record import RECORD_NAME, RunRecorder, read_record
 
     config = RunConfig(
         task,

@@ -31,7 +31,7 @@ from forestall.comparison.prepare import (
     prepare,
     tie_values,
 )
-from forestall.interfaces import TextEncoder
+from forestall.seams import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Calibration, Decision, Reference, ScoreParts, Verdict
 

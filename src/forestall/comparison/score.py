@@ -20,7 +20,7 @@ from forestall.comparison.options import (
     StructureCount,
 )
 from forestall.comparison.prepare import LabelTable, prepare
-from forestall.interfaces import TextEncoder
+from forestall.seams import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Discrepancy, ScoreParts
 

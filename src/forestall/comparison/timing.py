@@ -15,7 +15,7 @@ import numpy.typing as npt
 from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.errors import InputError
-from forestall.interfaces import TextEncoder
+from forestall.seams import TextEncoder
 from forestall.types.facts import GRIPPER
 from forestall.types.feature import quantised
 from forestall.types.graph import ObjectNode, Relation, SceneGraph

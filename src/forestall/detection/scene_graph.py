@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from forestall.errors import InputError
-from forestall.interfaces import GraphScorer
+from forestall.seams import GraphScorer
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import Observation
 from forestall.types.verdict import Calibration, Decision, Reference, Verdict

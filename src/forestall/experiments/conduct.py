@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from forestall.benchmark.rows import EpisodeRow
 from forestall.build import prepare
 from forestall.demonstrations import ready_made
 from forestall.errors import InputError, UnknownNameError
@@ -28,6 +27,7 @@ from forestall.experiments.runs import (
 )
 from forestall.experiments.worker import Work, broken_row, config_of, run_one
 from forestall.memory.store import open_store
+from forestall.statistics.rows import EpisodeRow
 
 Progress = Callable[[int, int, str], None]
 

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import IO, Any
 
 import forestall
-from forestall.benchmark.rows import ROW_FORMAT, EpisodeRow
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Choice, Settings
 from forestall.fingerprint import ROW_MAKING, sources_digest
-from forestall.report.record import replace_file
+from forestall.records.record import replace_file
+from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
 KIND = "experiment"
 ABOUT = "experiment.json"

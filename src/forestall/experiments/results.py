@@ -10,16 +10,16 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from forestall.benchmark.cases import CASE_SETS, cases
-from forestall.benchmark.findings import findings
-from forestall.benchmark.summary import summary as summarised
-from forestall.benchmark.tables import Table, tables
 from forestall.errors import FileFormatError
 from forestall.experiments.folder import ResultsFolder
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
+from forestall.records.record import replace_file
 from forestall.report.experiment_page import write_experiment
-from forestall.report.record import replace_file
+from forestall.statistics.cases import CASE_SETS, cases
+from forestall.statistics.findings import findings
+from forestall.statistics.summary import summary as summarised
+from forestall.statistics.tables import Table, tables
 
 SUMMARY = "summary.json"
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from forestall.benchmark.cases import CASE_SETS, UNDISTURBED, Case, cases
-from forestall.benchmark.metrics import THRESHOLDS
-from forestall.benchmark.rows import row_key
 from forestall.errors import InputError, UnknownNameError
 from forestall.parts import STATES, THRESHOLD
 from forestall.registry import load
+from forestall.statistics.cases import CASE_SETS, UNDISTURBED, Case, cases
+from forestall.statistics.metrics import THRESHOLDS
+from forestall.statistics.rows import row_key
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "all")
 

@@ -11,20 +11,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from forestall.benchmark.faults import knowable
-from forestall.benchmark.rows import EpisodeRow, Judged
-from forestall.benchmark.truth import TruthTrace
 from forestall.build import Prepared, RunConfig, prepare, run_episode
 from forestall.demonstrations import ready_made
-from forestall.envs.kitchen.rendering import FrameMemory
 from forestall.experiments.runs import Run, Settings
 from forestall.memory.store import open_store
-from forestall.report.derived import adopted, alarms, reasoning_s, replans
+from forestall.records.derived import adopted, alarms, reasoning_s, replans
+from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
-from forestall.report.record import RunRecorder
+from forestall.statistics.rows import EpisodeRow, Judged
+from forestall.tasks.faults import knowable
+from forestall.tasks.truth import TruthTrace
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, SkillStatus
 from forestall.types.verdict import Decision, ReplanOutcome
+from forestall.worlds.kitchen.rendering import FrameMemory
 
 PAGES = "episodes"
 """Folder of the episodes' own pages, inside that of an experiment."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forestall.errors import InputError, MemoryFileError
-from forestall.interfaces import DemonstrationStore, TextEncoder
+from forestall.seams import DemonstrationStore, TextEncoder
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Reference

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import InputError
-from forestall.interfaces import ImageTextEncoder
+from forestall.seams import ImageTextEncoder
 from forestall.types.observation import Detection, Frame
 from forestall.vocabulary import Vocabulary
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from forestall.errors import InputError, PerceptionError
-from forestall.interfaces import ImageEncoder, Segmenter, StateEstimator
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.naming import name_detections
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
 from forestall.perception.unproject import Cloud, Points, clouds, label_image
+from forestall.seams import ImageEncoder, Segmenter, StateEstimator
 from forestall.types.feature import quantised
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Observation

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import time
 
-from forestall.interfaces import PlanValidator
 from forestall.planning.planner import plan_goal
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import observed
+from forestall.seams import PlanValidator
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome

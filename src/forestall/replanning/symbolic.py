@@ -11,12 +11,12 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from forestall.interfaces import PlanValidator
 from forestall.planning.planner import Planned, plan_goal, plan_to
 from forestall.planning.relevance import alternatives
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
 from forestall.planning.validate import observed, unsupported
+from forestall.seams import PlanValidator
 from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext

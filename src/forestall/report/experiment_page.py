@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from forestall.records.record import replace_file
 from forestall.report.experiment_view import View, experiment_view
 from forestall.report.figure_style import colours_css, inline_svg
-from forestall.report.record import replace_file
 
 if TYPE_CHECKING:
-    from forestall.benchmark.rows import EpisodeRow
+    from forestall.statistics.rows import EpisodeRow
 
 PAGE_NAME = "index.html"
 FIGURES_NAME = "figures"

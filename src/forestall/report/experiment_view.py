@@ -15,7 +15,7 @@ from forestall.report import figure_data as data
 from forestall.report import figures, run_figures
 
 if TYPE_CHECKING:
-    from forestall.benchmark.rows import EpisodeRow
+    from forestall.statistics.rows import EpisodeRow
 
 LOOKS: Mapping[str, tuple[str, str]] = {
     "holds": ("go", "✓"),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from forestall.report.figure_values import Curve, Distribution, Dot, Estimate, Lane, Shares, Spent
 
 if TYPE_CHECKING:
-    from forestall.benchmark.rows import EpisodeRow
+    from forestall.statistics.rows import EpisodeRow
 
 Summary = Mapping[str, Any]
 Names = Callable[[str], str]

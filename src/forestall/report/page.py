@@ -12,10 +12,10 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from forestall.report.derived import in_words
+from forestall.records.derived import in_words
+from forestall.records.record import replace_file
 from forestall.report.graph_svg import graph_css
 from forestall.report.page_view import duration, page_view, status_sign
-from forestall.report.record import replace_file
 from forestall.types.episode import EpisodeRecord
 
 

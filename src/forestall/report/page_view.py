@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from forestall.report.as_json import plain
-from forestall.report.derived import (
+from forestall.records.as_json import plain
+from forestall.records.derived import (
     SIMULATOR_PHASES,
     Alarm,
     Mark,
@@ -24,8 +24,8 @@ from forestall.report.derived import (
     provenance_of,
     reasoning_s,
 )
+from forestall.records.pictures import Picture, page_picture
 from forestall.report.graph_svg import graph_svg
-from forestall.report.pictures import Picture, page_picture
 from forestall.types.episode import EpisodeRecord, SkillStatus
 from forestall.types.observation import Observation
 from forestall.types.runtime import When

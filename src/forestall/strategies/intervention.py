@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 
-from forestall.interfaces import PlanValidator, Replanner
+from forestall.seams import PlanValidator, Replanner
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked, look_again
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import Literal

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.intervention import Clock, Intervention, look_again
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer

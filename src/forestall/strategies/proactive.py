@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from forestall.interfaces import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.intervention import Clock, Intervention
 from forestall.types.episode import SkillOutcome
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer

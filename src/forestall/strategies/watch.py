@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from forestall.errors import InputError
-from forestall.interfaces import Detector, Reasoner, Retriever
+from forestall.seams import Detector, Reasoner, Retriever
 from forestall.strategies.intervention import Clock
 from forestall.types.episode import SkillOutcome
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer

@@ -15,15 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
-from forestall.envs.kitchen.environment import SCAN_TILT_RAD
-from forestall.envs.kitchen.model import build_scene
-from forestall.envs.kitchen.rendering import make_renderer
-from forestall.envs.kitchen.world import KitchenWorld
 from forestall.errors import SceneError
 from forestall.types.facts import category_of
 from forestall.types.observation import Frame, Intrinsics
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.vocabulary import ATTRIBUTES, Vocabulary
+from forestall.worlds.kitchen.environment import SCAN_TILT_RAD
+from forestall.worlds.kitchen.model import build_scene
+from forestall.worlds.kitchen.rendering import make_renderer
+from forestall.worlds.kitchen.world import KitchenWorld
 
 UNSEEN = ("temperature",)
 """Attributes that no picture shows."""

@@ -26,7 +26,7 @@ from forestall.config import PICTURE_SEEDS
 from forestall.embeddings.crops import MARGIN, crop, whole
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.segmenters import InstanceSegmenter
-from forestall.report.record import replace_file
+from forestall.records.record import replace_file
 from forestall.training.scenes import Artist, Picture, SceneConfig
 from forestall.vocabulary import ATTRIBUTES, Vocabulary, household, parse_category
 

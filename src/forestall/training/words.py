@@ -17,7 +17,7 @@ import numpy as np
 
 from forestall.attributes import with_articles
 from forestall.errors import FileFormatError
-from forestall.interfaces import TextEncoder
+from forestall.seams import TextEncoder
 from forestall.vocabulary import Vocabulary
 
 GROUPS = ("spelling", "meaning")

@@ -1,1 +1,0 @@
-"""Worlds in which a robot looks and acts: the embedded household and adapters to others."""

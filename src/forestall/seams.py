@@ -1,0 +1,304 @@
+"""Every Protocol of the project; implementations never import each other.
+
+Calls point downwards: a command builds a runtime (`build.py`), the runtime calls its strategy, the
+strategy calls detector, reasoner, replanner; all of them see only this file and `types/`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.types.demonstration import Demonstration
+from forestall.types.encoder import StateReading
+from forestall.types.episode import EpisodeRecord, Event, SkillOutcome
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
+
+
+class Environment(Protocol):
+    """A world in which a robot looks and acts. One instance is one scene."""
+
+    def reset(self, seed: int) -> None:
+        """Put the world into the start state of this seed, the same to the last bit each time."""
+
+    def scan(self, thorough: bool = False) -> Observation:
+        """Look all around from where the robot stands; `thorough`: the floor at its feet, too."""
+
+    def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
+        """Look towards world points: one frame for each group of points that one view can hold.
+
+        Straight ahead and slightly down when there are none. What the hand holds is in a view, too.
+        """
+
+    def approach(self, name: str) -> float:
+        """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
+
+    def execute(self, subtask: Subtask) -> SkillOutcome:
+        """Run one skill; refuse with a reason when its needs are not met."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since reset."""
+
+    def close(self) -> None:
+        """Free what the environment holds."""
+
+
+class OracleView(Protocol):
+    """Ground truth. Only worlds, perception/oracle and tasks/ may touch it."""
+
+    def truth(self) -> SceneGraph:
+        """The complete state: every object, every state, containment, what is held."""
+
+    def states(self, instance: str) -> Mapping[str, str]:
+        """True attribute values of one instance, empty if there is no such instance now."""
+
+    def spoiled(self) -> frozenset[str]:
+        """Instances to which something irreversible has happened."""
+
+    def events(self) -> tuple[Event, ...]:
+        """Everything that has happened since reset, in order."""
+
+
+class Disturbance(Protocol):
+    """What a fault may do to a world while it runs (benchmark only)."""
+
+    def drop_held(self, hard: bool = False) -> str | None:
+        """Let go of the held object where the robot is; its name, None for an empty hand.
+
+        A hard fall breaks what is fragile.
+        """
+
+
+class World(Protocol):
+    """Geometry of the embedded household: knows places and looks, not meanings or rules.
+
+    Things are named by instance ("Mug-1"). What was placed on or in a thing is attached to it and
+    moves with it.
+    """
+
+    def drive_to(self, name: str) -> float:
+        """Drive to where `name` can be reached and face it; returns the simulated seconds."""
+
+    def within_reach(self, name: str) -> bool:
+        """Whether `name` can be reached from where the robot stands."""
+
+    def blocker(self, name: str) -> str | None:
+        """What stands between the robot's hand and `name` on the same support, if anything."""
+
+    def has_room(self, thing: str, receptacle: str) -> bool:
+        """Whether there is a free spot for `thing` on or in `receptacle`."""
+
+    def place(self, thing: str, receptacle: str) -> None:
+        """Put `thing` at a free spot on or in `receptacle`, resting on it, and attach it."""
+
+    def hold(self, thing: str) -> None:
+        """Move `thing` (with what is attached to it) into the gripper."""
+
+    def drop(self, thing: str) -> None:
+        """Let `thing` (with what is attached to it) fall from the gripper to the floor nearby."""
+
+    def show(self, name: str, attribute: str, value: str) -> None:
+        """Make a state visible (door angle, liquid, dirt, glow, ...); unknown pairs are ignored."""
+
+    def replace(self, old: str, new: Sequence[str]) -> None:
+        """Take `old` away and put prepared things (its slices, its cracked egg) at its place."""
+
+
+class Renderer(Protocol):
+    """Draws one frame of a compiled MuJoCo model (embedded household only)."""
+
+    name: str
+
+    def render(self, data: Any, camera_to_world: npt.NDArray[np.float64]) -> Frame:
+        """RGB, metric z-depth and instance ids of the current state.
+
+        Args:
+            data: mujoco.MjData of the model that the renderer was made for.
+            camera_to_world: (4, 4), x right, y down, z forward.
+        """
+
+
+class Segmenter(Protocol):
+    """Finds instances in a frame."""
+
+    name: str
+
+    def segment(self, frame: Frame) -> Sequence[Detection]:
+        """Instance masks with categories; the same instance name over frames when it tracks."""
+
+
+class StateEstimator(Protocol):
+    """Reads states of detected objects off a frame."""
+
+    name: str
+
+    def estimate(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> Sequence[Mapping[str, str | None]]:
+        """For each detection: attribute → value, None where it cannot be told."""
+
+
+class Perceiver(Protocol):
+    """Turns observations into one scene graph that lives over the episode."""
+
+    def reset(self) -> None:
+        """Forget everything."""
+
+    def perceive(self, observation: Observation) -> SceneGraph:
+        """Fuse an observation and return the whole graph as believed now."""
+
+    def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
+        """The part of a graph that concerns a (grounded) subtask, with its subtask node."""
+
+    def describe(self) -> Mapping[str, str]:
+        """Which segmenter, state estimator and image encoder are used (goes into every record)."""
+
+
+class TextEncoder(Protocol):
+    """Embeds short texts."""
+
+    name: str
+
+    def encode(self, texts: Sequence[str]) -> npt.NDArray[np.float32]:
+        """(n, d) float32 rows of unit length."""
+
+
+class ImageEncoder(Protocol):
+    """Embeds pictures; what one encoder gives compares only with what the same one gives."""
+
+    name: str
+
+    def encode_crops(self, rgb: Rgb, masks: Sequence[Mask]) -> npt.NDArray[np.float32]:
+        """(n, d) float32 rows of unit length, one for the object under each mask."""
+
+    def encode_image(self, rgb: Rgb) -> npt.NDArray[np.float32]:
+        """(d,) float32 of unit length: the whole picture."""
+
+
+class Captioner(Protocol):
+    """Says in a few sentences what a picture shows."""
+
+    name: str
+
+    def caption(self, observation: Observation, scoped: SceneGraph) -> str:
+        """`scoped` is what perception made of the observation; a model that sees ignores it."""
+
+
+class ImageTextEncoder(ImageEncoder, TextEncoder, Protocol):
+    """Pictures and texts in one space, as CLIP has them."""
+
+    reading: StateReading
+
+
+class DemonstrationStore(Protocol):
+    """Where demonstrations live."""
+
+    def add(self, demonstration: Demonstration) -> str:
+        """Store one successful run in one transaction; returns its id."""
+
+    def all(self) -> Sequence[Demonstration]:
+        """Every demonstration in id order (graphs loaded, images by reference)."""
+
+
+class Retriever(Protocol):
+    """Context-aware reference retrieval (paper, Sec. 3)."""
+
+    def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
+        """References for a subtask, best first; `done` is the position in the nominal plan."""
+
+
+class GraphScorer(Protocol):
+    """Compares an observed graph with an expected one."""
+
+    def best(self, observed: SceneGraph, references: Sequence[Reference]) -> Verdict | None:
+        """Score against every reference; None where there is none."""
+
+
+class Detector(Protocol):
+    """Judges whether a scene fits its references."""
+
+    name: str
+
+    def judge(
+        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+    ) -> Verdict:
+        """`observed` is the scoped graph of the boundary."""
+
+
+class Reasoner(Protocol):
+    """Explains a mismatch and says what must change (paper, "reasoning module")."""
+
+    name: str
+
+    def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
+        """An empty `must_change` says that nothing was found that must change."""
+
+
+class PlanValidator(Protocol):
+    """Executes any plan on an observed graph."""
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        """Names the first step that cannot run and why; then checks the goal."""
+
+
+class Replanner(Protocol):
+    """Makes the corrected plan for the rest of the task (paper, "replanning module")."""
+
+    name: str
+
+    def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
+        """A plan that starts from the observed state and replaces what was left of the old one."""
+
+
+class Strategy(Protocol):
+    """Where a run may be interrupted; one loop serves all strategies."""
+
+    name: str
+    looks_after: LooksAfter
+
+    def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
+        """Called with the perceived scene before each subtask."""
+
+    def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
+        """Called after each subtask: with what is seen then, if it `looks_after` subtasks."""
+
+    def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
+        """Called when the plan is finished; may ask for a further plan.
+
+        With what is seen then, if it `looks_after` subtasks or episodes.
+        """
+
+
+class Listener(Protocol):
+    """Records, pages, progress; cannot change an episode."""
+
+    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
+        """The episode begins."""
+
+    def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
+        """A boundary was judged."""
+
+    def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
+        """A subtask was executed."""
+
+    def on_end(self, record: EpisodeRecord) -> None:
+        """The episode is over."""
+
+
+class GoalChecker(Protocol):
+    """Scores a finished run on the truth (benchmark only)."""
+
+    def check(self, goal: Goal, oracle: OracleView) -> tuple[bool, bool | None, tuple[str, ...]]:
+        """Strict success, the weaker check of REFLECT, and what failed in words."""
+
+
+__all__ = [name for name, value in list(globals().items()) if getattr(value, "_is_protocol", False)]

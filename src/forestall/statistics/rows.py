@@ -1,0 +1,166 @@
+"""What is kept of one episode of an experiment: one JSON line.
+
+Written by the experiments, read by metrics, tables, figures and pages. Truth about the scene is in
+`Judged.possible` and `Judged.reachable`; it was taken for scoring, no part of the run saw it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from forestall.errors import FileFormatError
+from forestall.statistics.cases import Case
+
+ROW_FORMAT = 1
+"""Raised whenever a field changes its meaning; rows of another format are refused."""
+
+
+def row_key(case: Case, strategy: str, detector: str, threshold: float, without: str | None) -> str:
+    """The key of an episode: readable, unique within an experiment, fit for a folder's name."""
+    parts = [case.scenario or f"undisturbed-{case.task}", str(case.seed), strategy]
+    if strategy not in ("none", "watch"):
+        parts += [detector, f"{threshold:.2f}"]
+    return "_".join([*parts, *([f"without-{without}"] if without else [])])
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One judgement of a run: at a boundary before a subtask, after it, or at the end.
+
+    Args:
+        index: of the boundary; in an unmonitored run it is the position in the plan.
+        when: "before", "after" or "end".
+        subtask: in text form.
+        time_s: simulated.
+        score: of the detector that decided, None where nothing was compared.
+        decision: "proceed", "replan" (an alarm) or "stop", after the last look.
+        confirmed: whether the reasoner found something that must change.
+        replanned: whether a new plan was adopted.
+        cause: the diagnosis in words, empty without alarm.
+        looks: how many looks it took.
+        scores: of every watching detector by name, None where it had nothing to compare with.
+        possible: truth: the next subtask could be carried out now.
+        reachable: truth: what is left of the plan would reach the goal from here.
+    """
+
+    index: int
+    when: str
+    subtask: str
+    time_s: float
+    score: float | None
+    decision: str
+    confirmed: bool = False
+    replanned: bool = False
+    cause: str = ""
+    looks: int = 1
+    scores: dict[str, float | None] = field(default_factory=dict, hash=False)
+    possible: bool | None = None
+    reachable: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeRow:
+    """One episode.
+
+    Args:
+        set: "robofail", "irreversible", "undisturbed" or "harmless".
+        task: its name.
+        scenario: None for an undisturbed run.
+        kind: of the failure, None for an undisturbed run.
+        knowable: through what it can be known: "scene" (before anything is done), "plan" (only by
+            one who knows the task), "after" (after something went wrong on the way); None if not
+            failing.
+        seed: of the scene.
+        strategy: "watch" is the unmonitored run, judged by every detector and never interrupted.
+        detector: that decided.
+        threshold: of it.
+        without: what was left out ("reasoning", "validation", a part of the score), or None.
+        known: position in the starting plan of the first step before which the failure can be
+            known; the plan's length for "after the last step"; None if not failing.
+        effect: position of the step that does the harm, likewise.
+        success: strict check. `weak_success`: REFLECT's own. `failures`: what failed, in words.
+        harmed: what must never have happened and did, in words (irreversible).
+        harmed_s: simulated time of the first such thing, None without.
+        end: why the run ended; "error" with `error` in words.
+        steps: length of the starting plan.
+        executed: how many subtasks were executed. `refused`: how many of them were refused.
+        judged: in order.
+        replans: adopted plans. `planner_calls`: attempts to make one. `model_calls`: requests to
+            language models.
+        simulated_s: robot time.
+        compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
+        implied: whether it was not executed: its detector never alarms on what the unmonitored run
+            shows, so that the run is that one.
+        provenance: configuration, versions, demonstrations.
+    """
+
+    set: str
+    task: str
+    scenario: str | None
+    kind: str | None
+    knowable: str | None
+    seed: int
+    strategy: str
+    detector: str
+    threshold: float
+    without: str | None
+    known: int | None
+    effect: int | None
+    success: bool
+    weak_success: bool | None
+    failures: tuple[str, ...]
+    harmed: tuple[str, ...]
+    harmed_s: float | None
+    end: str
+    error: str
+    steps: int
+    executed: int
+    refused: int
+    judged: tuple[Judged, ...]
+    replans: int
+    planner_calls: int
+    model_calls: int
+    simulated_s: float
+    compute_s: dict[str, float] = field(hash=False)
+    reasoning_s: float = 0.0
+    implied: bool = False
+    provenance: dict[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def key(self) -> str:
+        """What makes an episode the same one within an experiment."""
+        return row_key(
+            Case(self.set, self.task, self.scenario, self.seed),
+            self.strategy,
+            self.detector,
+            self.threshold,
+            self.without,
+        )
+
+    @property
+    def failing(self) -> bool:
+        """Whether the case is one that fails when nobody steps in."""
+        return self.known is not None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"format": ROW_FORMAT, **asdict(self)}
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> EpisodeRow:
+        """Read what `to_json` wrote.
+
+        Raises:
+            FileFormatError: another format, or fields that do not fit.
+        """
+        fields = dict(data)
+        if (found := fields.pop("format", None)) != ROW_FORMAT:
+            raise FileFormatError(f"a result of format {found}; this version reads {ROW_FORMAT}")
+        try:
+            judged = tuple(Judged(**j) for j in fields.pop("judged"))
+            for name in ("failures", "harmed"):
+                fields[name] = tuple(fields[name])
+            return cls(judged=judged, **fields)
+        except (TypeError, KeyError) as error:
+            raise FileFormatError(f"not a result of this version: {error}") from error

@@ -1,0 +1,184 @@
+"""An environment whose skills go wrong now and then, as a scenario says.
+
+Wraps any `Environment` and is one itself. Built by `faults.wrap`; calls point inwards.
+
+A robot that has picked up the wrong thing goes on taking it for the right one: what is done with
+the one is done with the other, until a subtask names the wrong thing, which shows that the mistake
+was noticed, or the right one is picked up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from forestall.seams import Disturbance, Environment
+from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.facts import is_instance
+from forestall.types.observation import Observation, Vec3
+from forestall.types.plan import Subtask
+from forestall.vocabulary import Vocabulary
+
+
+class Activation(Protocol):
+    """When an execution fault happens: at the n-th execution of a step, so many times."""
+
+    @property
+    def kind(self) -> str:
+        """What goes wrong."""
+
+    @property
+    def step(self) -> str:
+        """The subtask concerned, as plans write it."""
+
+    @property
+    def occurrence(self) -> int:
+        """At which execution of the step it happens first, from 1."""
+
+    @property
+    def times(self) -> int:
+        """How many times it happens at most."""
+
+
+class FaultyEnvironment:
+    """Hands every call on, and lets faults happen in `execute`."""
+
+    def __init__(
+        self,
+        environment: Environment,
+        faults: Sequence[Activation],
+        disturbance: Disturbance,
+        vocabulary: Vocabulary,
+    ) -> None:
+        self._inner = environment
+        self._faults = tuple(faults)
+        self._disturbance = disturbance
+        self._vocabulary = vocabulary
+        self._seen = [0] * len(self._faults)
+        self._done = [0] * len(self._faults)
+        self._mistaken: set[int] = set()
+
+    def reset(self, seed: int) -> None:
+        """Reset the world and arm every fault again."""
+        self._seen = [0] * len(self._faults)
+        self._done = [0] * len(self._faults)
+        self._mistaken = set()
+        self._inner.reset(seed)
+
+    def scan(self, thorough: bool = False) -> Observation:
+        """As the wrapped environment."""
+        return self._inner.scan(thorough)
+
+    def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
+        """As the wrapped environment."""
+        return self._inner.observe(focus)
+
+    def approach(self, name: str) -> float:
+        """Drive near, undisturbed."""
+        return self._inner.approach(name)
+
+    def execute(self, subtask: Subtask) -> SkillOutcome:
+        """Run a skill, with every fault that is due."""
+        self._notice(subtask)
+        due = self._due(subtask)
+        command, silent = self._mixed_up(subtask), False
+        for index in due:
+            fault = self._faults[index]
+            if fault.kind == "failed_action":
+                silent = True
+            elif fault.kind in ("wrong_object", "wrong_receptacle"):
+                command = self._misled(command, fault)
+            if fault.kind != "drop":
+                self._done[index] += 1
+        lets_go = command.skill in ("put_on", "put_in")
+        if lets_go:
+            self._inner.approach(command.args[-1])
+            self._drop(due)
+        outcome = self._pretend(command) if silent else self._inner.execute(command)
+        if not lets_go:
+            self._drop(due)
+        if subtask.skill == "pick_up" and outcome.status is SkillStatus.SUCCEEDED:
+            self._mistaken -= {i for i in self._mistaken if self._is_right(i, subtask.args[0])}
+            self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
+        return outcome
+
+    def _notice(self, subtask: Subtask) -> None:
+        """A mistake ends for good when a subtask names the wrong thing."""
+        for index in sorted(self._mistaken):
+            by = _acts_on(self._faults[index])
+            if any(self._same(by, a) for a in subtask.args):
+                self._mistaken.discard(index)
+                self._done[index] = self._faults[index].times
+
+    def _mixed_up(self, subtask: Subtask) -> Subtask:
+        """The subtask with what is taken for something else; picking up looks anew."""
+        args = subtask.args
+        for index in sorted(self._mistaken) if subtask.skill != "pick_up" else ():
+            by = _acts_on(self._faults[index])
+            args = tuple(by if self._is_right(index, a) else a for a in args)
+        return Subtask(subtask.skill, args)
+
+    def _is_right(self, index: int, name: str) -> bool:
+        """Whether a name means the thing that a fault mistakes something for."""
+        return self._same(Subtask.parse(self._faults[index].step).args[0], name)
+
+    def _drop(self, due: Sequence[int]) -> None:
+        """Lose what is held: on the way for a placing subtask, else after it."""
+        for index in due:
+            fault = self._faults[index]
+            if fault.kind != "drop":
+                continue
+            hard = bool(getattr(fault, "hard", False))
+            if self._disturbance.drop_held(hard) is not None:
+                self._done[index] += 1
+
+    @property
+    def time_s(self) -> float:
+        """As the wrapped environment."""
+        return self._inner.time_s
+
+    def close(self) -> None:
+        """As the wrapped environment."""
+        self._inner.close()
+
+    def _due(self, subtask: Subtask) -> list[int]:
+        due = []
+        for index, fault in enumerate(self._faults):
+            if not self._means(Subtask.parse(fault.step), subtask):
+                continue
+            self._seen[index] += 1
+            if self._seen[index] >= fault.occurrence and self._done[index] < fault.times:
+                due.append(index)
+        return due
+
+    def _means(self, named: Subtask, executed: Subtask) -> bool:
+        """Whether a step of a scenario names this subtask: categories stand for instances."""
+        return named.skill == executed.skill and all(
+            self._same(a, b) for a, b in zip(named.args, executed.args, strict=True)
+        )
+
+    def _same(self, named: str, given: str) -> bool:
+        a, b = self._vocabulary.canonical(named), self._vocabulary.canonical(given)
+        if is_instance(a):
+            return a == b
+        category = self._vocabulary.find(b)
+        return a == (b if category is None else category.name)
+
+    def _misled(self, subtask: Subtask, fault: Activation) -> Subtask:
+        by = _acts_on(fault)
+        position = -1 if fault.kind == "wrong_receptacle" else 0
+        args = list(subtask.args)
+        args[position] = by
+        return Subtask(subtask.skill, tuple(args))
+
+    def _pretend(self, subtask: Subtask) -> SkillOutcome:
+        """Drive there as the skill would, do nothing, and report success."""
+        before = self._inner.time_s
+        if subtask.skill != "navigate_to_obj":
+            self._inner.execute(Subtask("navigate_to_obj", subtask.args[-1:]))
+        return SkillOutcome(SkillStatus.SUCCEEDED, self._inner.time_s - before)
+
+
+def _acts_on(fault: Activation) -> str:
+    """What a misled subtask acts on instead."""
+    return str(getattr(fault, "acts_on", ""))

@@ -1,0 +1,337 @@
+"""Task and scenario files: one documented TOML format, validated, with a JSON schema.
+
+Calls: command line and build → here → types. A task file holds the goal, the nominal plan, what
+the scene needs, and, when it speaks of things that the project does not know, their categories. A
+scenario file names a task and adds faults; a file of a set holds several scenarios of one task. All
+are checked against the vocabulary when loaded.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from forestall.attributes import parse_attribute
+from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.tasks.faults import Fault
+from forestall.tasks.schemas import (
+    GoalFile,
+    ScenarioFields,
+    ScenarioFile,
+    ScenarioSetFile,
+    SceneFile,
+    TaskFile,
+)
+from forestall.types.facts import DERIVED, RELATIONS, category_of, is_instance
+from forestall.types.facts import Literal as Fact
+from forestall.types.plan import Plan, Subtask
+from forestall.types.scene import ObjectNeed, SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.vocabulary import Vocabulary, household, parse_category
+
+SETS = ("examples", "robofail", "irreversible", "harmless")
+"""Sets of shipped scenarios; each but the first is a folder of its own."""
+
+END = "end"
+"""The moment after the last step of a plan."""
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedTask:
+    """A task with the vocabulary that it is written in."""
+
+    task: Task
+    vocabulary: Vocabulary
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A task with faults.
+
+    Args:
+        name: unique among all sets.
+        task: name of its task.
+        title: in a few words.
+        kind: what sort of failure it is, in RoboFail's terms where it has one.
+        cause: what is wrong, in a sentence; for a harmless one, what is different.
+        faults: what is changed.
+        set: "examples", "robofail", "irreversible" or "harmless"; "own" for a user's file.
+        source: which published episode it rebuilds, empty for one of our own.
+        known: the first step of its plan before which one who looks well and knows the task can
+            know that the run will fail, "end" for after the last one; None for a harmless one.
+        effect: the first step from then on that is refused or does harm because of it (a thing
+            that breaks by falling: the step on which it falls), "end" where none is and the run
+            merely ends without its goal; None likewise.
+
+    Both are a step in text form; " #2" behind it means its second occurrence.
+    """
+
+    name: str
+    task: str
+    title: str
+    kind: str
+    cause: str
+    faults: tuple[Fault, ...]
+    set: str = "own"
+    source: str = ""
+    known: str | None = None
+    effect: str | None = None
+
+    @property
+    def harmless(self) -> bool:
+        """Whether nothing fails because of it."""
+        return self.set == "harmless"
+
+    def moments(self, plan: Plan) -> tuple[int | None, int | None]:
+        """Where `known` and `effect` are in the plan that the run starts with, from 0.
+
+        Raises:
+            InputError: the plan has no such step.
+        """
+        return _moment(self.known, plan), _moment(self.effect, plan)
+
+
+def schemas() -> dict[str, Any]:
+    """JSON schemas of both file formats."""
+    return {
+        "task": TypeAdapter(TaskFile).json_schema(),
+        "scenario": TypeAdapter(ScenarioFile).json_schema(),
+    }
+
+
+def task_names() -> tuple[str, ...]:
+    """Names of the shipped tasks."""
+    return tuple(sorted(name for name, _ in _shipped("tasks")))
+
+
+def scenario_names(of: str | None = None) -> tuple[str, ...]:
+    """Names of the shipped scenarios, of one set or of all.
+
+    Raises:
+        UnknownNameError: no such set.
+    """
+    if of is not None and of not in SETS:
+        raise UnknownNameError("set of scenarios", of, SETS)
+    return tuple(n for n, s in _scenarios().items() if of in (None, s.set))
+
+
+def load_task(name_or_file: str) -> LoadedTask:
+    """A shipped task by name, or any task file by path.
+
+    Raises:
+        UnknownNameError: neither a shipped task nor a file.
+        FileFormatError: the file is not TOML or has a wrong field.
+        InputError: it speaks of a skill, category, attribute or value that is not known.
+    """
+    source, text = _read("tasks", "task", name_or_file)
+    return _task(source, _validated(TaskFile, source, text))
+
+
+def load_scenario(name_or_file: str) -> Scenario:
+    """A shipped scenario by name, or any scenario file by path.
+
+    Raises:
+        UnknownNameError: neither a shipped scenario nor a file.
+        FileFormatError: the file is not TOML or has a wrong field.
+    """
+    if _is_file(name_or_file):
+        source, text = _read("scenarios", "scenario", name_or_file)
+        data = _validated(ScenarioFile, source, text)
+        return _scenario(data, data.task, "own")
+    shipped = _scenarios()
+    if name_or_file not in shipped:
+        raise UnknownNameError("scenario", name_or_file, shipped)
+    return shipped[name_or_file]
+
+
+@cache
+def _scenarios() -> Mapping[str, Scenario]:
+    """Every shipped scenario by name, in the order of sets, tasks and files."""
+    found: dict[str, Scenario] = {}
+    for name, text in sorted(_shipped("scenarios")):
+        data = _validated(ScenarioFile, name, text)
+        found[data.name] = _scenario(data, data.task, SETS[0])
+    for set_name in SETS[1:]:
+        for name, text in sorted(_shipped("scenarios", set_name)):
+            several = _validated(ScenarioSetFile, f"{set_name}/{name}", text)
+            for one in several.scenarios:
+                if one.name in found:
+                    raise InputError(f"{set_name}/{name}: there are two scenarios {one.name}")
+                found[one.name] = _scenario(one, several.task, set_name)
+    return found
+
+
+def _scenario(data: ScenarioFields, task: str, set_name: str) -> Scenario:
+    return Scenario(
+        data.name,
+        task,
+        data.title,
+        data.kind,
+        data.cause,
+        tuple(data.faults),
+        set_name,
+        data.source,
+        data.known,
+        data.effect,
+    )
+
+
+def _moment(text: str | None, plan: Plan) -> int | None:
+    if text is None:
+        return None
+    if text == END:
+        return len(plan)
+    step, _, number = text.partition("#")
+    wanted = str(Subtask.parse(step))
+    places = [i for i, t in enumerate(plan.texts()) if t == wanted]
+    occurrence = int(number) if number.strip().isdigit() else 0 if number else 1
+    if not 1 <= occurrence <= len(places):
+        raise InputError(f"{text!r}: the plan has {wanted} {len(places)} time(s)")
+    return places[occurrence - 1]
+
+
+def _is_file(name_or_file: str) -> bool:
+    return name_or_file.endswith(".toml") or "/" in name_or_file
+
+
+def _shipped(*folders: str) -> Iterator[tuple[str, str]]:
+    place = files("forestall").joinpath("domains", "household", *folders)
+    for entry in place.iterdir() if place.is_dir() else ():
+        if entry.name.endswith(".toml"):
+            yield entry.name.removesuffix(".toml"), entry.read_text(encoding="utf-8")
+
+
+def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str]:
+    if _is_file(name_or_file):
+        path = Path(name_or_file)
+        try:
+            return str(path), path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileFormatError(f"cannot read {kind} file {path}: {error}") from error
+    shipped = dict(_shipped(folder))
+    if name_or_file not in shipped:
+        raise UnknownNameError(kind, name_or_file, shipped)
+    return name_or_file, shipped[name_or_file]
+
+
+def _validated(model: type[M], source: str, text: str) -> M:
+    try:
+        return model.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(f"{source}: not valid TOML: {error}") from error
+    except ValidationError as error:
+        problems = "; ".join(
+            f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:4]
+        )
+        raise FileFormatError(f"{source}: {problems}") from error
+
+
+def _task(source: str, data: TaskFile) -> LoadedTask:
+    try:
+        vocabulary = _vocabulary(data)
+        goal = _goal(data.goal, vocabulary)
+        plan = Plan.parse(data.plan, data.goal.text)
+        for subtask in plan:
+            for name in subtask.args:
+                vocabulary[name]
+        task = Task(data.name, data.title, goal, plan, _scene(data.scene, vocabulary))
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    return LoadedTask(task, vocabulary)
+
+
+def _vocabulary(data: TaskFile) -> Vocabulary:
+    """The shipped vocabulary with what the file adds to it."""
+    known = household()
+    attributes = {
+        name: parse_attribute(name, table.model_dump(exclude_none=True), known.attributes.get(name))
+        for name, table in data.attributes.items()
+    }
+    values = {a.name: a.values for a in {**known.attributes, **attributes}.values()}
+    categories = {
+        name: parse_category(name, table, values, known.categories.get(name))
+        for name, table in data.categories.items()
+    }
+    return known.extended(categories, attributes)
+
+
+def _goal(data: GoalFile, vocabulary: Vocabulary) -> Goal:
+    for variable, category in data.variables.items():
+        if not variable.startswith("?"):
+            raise InputError(f"goal variable {variable!r} must start with '?'")
+        vocabulary[category]
+
+    def facts(texts: list[str]) -> tuple[Fact, ...]:
+        return tuple(_fact(t, data.variables, vocabulary) for t in texts)
+
+    return Goal(
+        text=data.text,
+        variables=tuple(sorted(data.variables.items())),
+        literals=facts(data.all),
+        never=facts(data.never),
+        weak=facts(data.weak),
+    )
+
+
+def _fact(text: str, variables: Mapping[str, str], vocabulary: Vocabulary) -> Fact:
+    fact = Fact.parse(text)
+    if fact.predicate in vocabulary.attributes:
+        values = vocabulary.values(fact.predicate)
+        if fact.value not in values:
+            raise UnknownNameError(f"value of {fact.predicate}", fact.value, values)
+    elif fact.predicate not in (*RELATIONS, *DERIVED):
+        known = (*vocabulary.attributes, *RELATIONS, *DERIVED)
+        raise UnknownNameError("fact", fact.predicate, known)
+    for name in fact.args:
+        if name.startswith("?"):
+            if name not in variables:
+                raise UnknownNameError("goal variable", name, variables)
+        elif name != "gripper":
+            vocabulary[name]
+    return fact
+
+
+def _scene(data: SceneFile, vocabulary: Vocabulary) -> SceneNeeds:
+    if not 0 <= data.clutter[0] <= data.clutter[1]:
+        raise InputError(f"scene.clutter {list(data.clutter)}: write [least, most]")
+    numbers: dict[str, int] = {}
+    objects = []
+    for need in data.objects:
+        category = vocabulary[need.category].name
+        for place in need.places:
+            vocabulary[place]
+        _check_states(category, need.states, vocabulary)
+        numbers[category] = numbers.get(category, 0) + 1
+        objects.append(
+            ObjectNeed(
+                id=need.id or f"{category}-{numbers[category]}",
+                category=category,
+                places=tuple(vocabulary.canonical(p) for p in need.places),
+                states=tuple(sorted(need.states.items())),
+                in_front_of=need.in_front_of,
+            )
+        )
+    overrides = []
+    for name, states in data.fixtures.items():
+        _check_states(name, states, vocabulary)
+        instance = name if is_instance(name) else f"{vocabulary[name].name}-1"
+        overrides += [(instance, a, v) for a, v in sorted(states.items())]
+    return SceneNeeds(data.room, tuple(objects), tuple(overrides), data.clutter)
+
+
+def _check_states(name: str, states: Mapping[str, str], vocabulary: Vocabulary) -> None:
+    category = vocabulary[category_of(name)]
+    for attribute, value in states.items():
+        if attribute not in category.attributes:
+            raise UnknownNameError(f"attribute of {category.name}", attribute, category.attributes)
+        if value not in vocabulary.values(attribute):
+            raise UnknownNameError(f"{attribute} of {name}", value, vocabulary.values(attribute))

@@ -1,0 +1,195 @@
+"""Scores a finished run on the truth: the strict check over state and history, and REFLECT's own.
+
+The success condition C_goal of the paper (Sec. 3, "Problem Formulation") asks for one binding of
+the goal's variables under which every literal holds in the end and nothing that must never happen
+has happened. What must never happen is looked up in what is spoiled, in the final state and in
+every event, so that washing the pan afterwards does not help. Calls: benchmark → here → oracle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from forestall.errors import InputError
+from forestall.seams import OracleView
+from forestall.types.episode import Event
+from forestall.types.facts import GRIPPER, Literal, Truth, category_of
+from forestall.types.graph import SceneGraph
+from forestall.types.task import Goal
+
+MADE = ("sliced", "cracked", "broken")
+"""Kinds of events by which the first of their objects became the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class _History:
+    """The final state with all that led to it."""
+
+    graph: SceneGraph
+    spoiled: frozenset[str]
+    events: tuple[Event, ...]
+    facts: tuple[Literal, ...]  # every fact that an event says became true
+
+    @classmethod
+    def of(cls, oracle: OracleView) -> _History:
+        events = oracle.events()
+        return cls(oracle.truth(), oracle.spoiled(), events, tuple(_facts(events)))
+
+    def holds(self, literal: Literal) -> bool:
+        """Whether a literal is true in the end."""
+        if literal.predicate == "spoiled":
+            wanted = literal.value == "true"
+            return any(_means(literal.args[0], n) for n in self.spoiled) == wanted
+        return self.graph.truth(literal) is Truth.TRUE
+
+    def happened(self, literal: Literal) -> bool:
+        """Whether a literal is true in the end or became true at any time."""
+        return self.holds(literal) or any(_covers(literal, f) for f in self.facts)
+
+    def first(self, literal: Literal) -> tuple[float, str]:
+        """When something first happened, and in which words; at 0 s if it was so at the start."""
+        for event in self.events:
+            fact = _fact(event)
+            if literal.predicate == "spoiled":
+                told = event.kind == "spoiled" and _means(literal.args[0], event.objects[0])
+            elif fact is not None:
+                told = _covers(literal, fact)
+            else:  # what was made is what it is from then on
+                made = event.objects[1:] if event.kind in MADE else ()
+                told = any(_means(literal.args[0], o) and self._is(literal, o) for o in made)
+            if told:
+                return event.time_s, event.text
+        return 0.0, f"{literal} from the start"
+
+    def _is(self, literal: Literal, instance: str) -> bool:
+        ground = Literal(literal.predicate, (instance, *literal.args[1:]), literal.value)
+        return self.graph.truth(ground) is Truth.TRUE
+
+    def why(self, literal: Literal) -> str:
+        """How a literal that does not hold looks instead."""
+        if literal.predicate == "spoiled":
+            return ""
+        node = self.graph.get(literal.args[0]) if len(literal.args) == 1 else None
+        value = None if node is None else node.state(literal.predicate)
+        return "" if value is None else f": it is {value}"
+
+    def cause(self, literal: Literal) -> str:
+        """The words of the event behind something that must not have happened."""
+        if literal.predicate != "spoiled":
+            return ""
+        texts = (
+            e.text
+            for e in self.events
+            if e.kind == "spoiled" and any(_means(literal.args[0], o) for o in e.objects)
+        )
+        text = next(texts, "")
+        return f": {text}" if text else ""
+
+
+class TruthGoalChecker:
+    """Implements `GoalChecker` on an environment's oracle."""
+
+    def check(self, goal: Goal, oracle: OracleView) -> tuple[bool, bool | None, tuple[str, ...]]:
+        """Strict success, weak success (None where the goal has no weaker check), failures.
+
+        Failures are those of the binding that comes nearest to the goal.
+        """
+        history = _History.of(oracle)
+        failures = _best(goal.variables, goal.literals, goal.never, history)
+        weak = None if not goal.weak else not _best(goal.variables, goal.weak, (), history)
+        return not failures, weak, failures
+
+
+def irreversible(goal: Goal, oracle: OracleView) -> tuple[tuple[float, str], ...]:
+    """What must never happen for a goal and has happened; () if nothing has.
+
+    A variable of the goal means any instance of its category here: what was spoiled is lost, also
+    where another thing served in the end.
+
+    Returns:
+        For each such literal the simulated seconds of its first event and that event in words, in
+        the order of time; 0 seconds for what was so from the start.
+    """
+    history = _History.of(oracle)
+    kinds = dict(goal.variables)
+    literals = dict.fromkeys(literal.bind(kinds) for literal in goal.never)
+    found = {history.first(literal) for literal in literals if history.happened(literal)}
+    return tuple(sorted(found))
+
+
+def _facts(events: Sequence[Event]) -> Iterator[Literal]:
+    yield from (fact for event in events if (fact := _fact(event)) is not None)
+
+
+def _fact(event: Event) -> Literal | None:
+    """The literal that an event says became true, if it says one."""
+    if event.kind not in ("state", "relation"):
+        return None
+    try:
+        return Literal.parse(event.text)
+    except InputError:
+        return None
+
+
+def _covers(literal: Literal, fact: Literal) -> bool:
+    """Whether a fact about instances is one that a literal of a goal speaks of."""
+    return (
+        fact.predicate == literal.predicate
+        and fact.value == literal.value
+        and len(fact.args) == len(literal.args)
+        and all(_means(a, b) for a, b in zip(literal.args, fact.args, strict=True))
+    )
+
+
+def _means(name: str, instance: str) -> bool:
+    """Whether a name in a goal, instance or category, can mean an instance."""
+    return name in (instance, category_of(instance))
+
+
+def _best(
+    variables: Sequence[tuple[str, str]],
+    literals: Sequence[Literal],
+    never: Sequence[Literal],
+    history: _History,
+) -> tuple[str, ...]:
+    """What fails under the best binding; empty where one binding fits.
+
+    The best has the fewest failures and, among those, the fewest literals that do not hold: what
+    was reached and spoiled tells more than what was never tried.
+    """
+    used = {a for literal in (*literals, *never) for a in literal.args}
+    chosen = [(v, c) for v, c in variables if v in used]
+    missing = tuple(f"there is no {c}" for _, c in chosen if not history.graph.of_category(c))
+    best: tuple[int, int, tuple[str, ...]] | None = None
+    for binding in _bindings(chosen, history.graph):
+        unmet = tuple(
+            f"{ground} does not hold in the end{history.why(ground)}"
+            for ground in (literal.bind(binding) for literal in literals)
+            if not history.holds(ground)
+        )
+        wrong = tuple(
+            f"{ground} must never be{history.cause(ground)}"
+            for ground in (literal.bind(binding) for literal in never)
+            if history.happened(ground)
+        )
+        failures = (*missing, *unmet, *wrong)
+        if best is None or (len(failures), len(unmet)) < best[:2]:
+            best = (len(failures), len(unmet), failures)
+        if not failures:
+            break
+    return ("no binding of the goal's variables is possible",) if best is None else best[2]
+
+
+def _bindings(
+    variables: Sequence[tuple[str, str]], graph: SceneGraph
+) -> Iterator[Mapping[str, str]]:
+    """Every binding to different instances; a category that is not there stands for itself."""
+    choices = [[n.id for n in graph.of_category(c) if n.id != GRIPPER] or [c] for _, c in variables]
+    for names in product(*choices):
+        if len(set(names)) == len(names):
+            yield {v: n for (v, _), n in zip(variables, names, strict=True)}
+
+
+__all__ = ["TruthGoalChecker", "irreversible"]

@@ -1,0 +1,161 @@
+"""Conformance suite: what every `Environment` must do, whatever world is behind it.
+
+Run it on a new adapter before anything else (after Gymnasium's environment checker). It speaks to
+the Protocol only and returns complaints in words; an empty list is a pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from forestall.seams import Environment
+from forestall.types.episode import SkillStatus
+from forestall.types.observation import Observation
+from forestall.types.plan import SKILLS, Subtask
+
+NONSENSE = "NoSuchThing"
+
+
+def check_environment(
+    make: Callable[[], Environment], seed: int, subtasks: Sequence[Subtask]
+) -> list[str]:
+    """Complaints about an environment; empty when it conforms.
+
+    Args:
+        make: builds a fresh environment.
+        seed: of the scene to check.
+        subtasks: a short plan that the scene allows; its outcomes must repeat.
+
+    Returns:
+        One sentence for each thing that is wrong: a run that does not repeat to the last bit, time
+        that goes backwards or disagrees with reported durations, observations that are not valid,
+        nonsense that is not refused, an exception where a refusal is due.
+    """
+    first, second = make(), make()
+    try:
+        return [
+            *_repeats(
+                "two fresh environments", _run(first, seed, subtasks), second, seed, subtasks
+            ),
+            *_repeats("two resets", _run(first, seed, subtasks), first, seed, subtasks),
+            *_refuses_nonsense(first, seed),
+        ]
+    finally:
+        first.close()
+        second.close()
+
+
+class _Run:
+    """What one run of a plan showed."""
+
+    def __init__(self) -> None:
+        self.observations: list[Observation] = []
+        self.outcomes: list[tuple[str, float, str]] = []
+        self.complaints: list[str] = []
+
+
+def _run(environment: Environment, seed: int, subtasks: Sequence[Subtask]) -> _Run:
+    run = _Run()
+    environment.reset(seed)
+    if environment.time_s != 0.0:
+        run.complaints.append(f"time is {environment.time_s} s after reset, not 0")
+    clock = environment.time_s
+    run.observations.append(environment.scan())
+    run.observations.append(environment.observe())
+    run.observations.append(environment.observe([(1.0, 1.0, 1.0), (0.0, 1.0, 0.5)]))
+    if len(run.observations[-1].frames) > 2:
+        run.complaints.append("observe with two focus points gives more than two frames")
+    for subtask in subtasks:
+        before = environment.time_s
+        outcome = environment.execute(subtask)
+        run.outcomes.append((outcome.status.value, outcome.duration_s, outcome.reason))
+        passed = environment.time_s - before
+        if outcome.duration_s < 0 or abs(passed - outcome.duration_s) > 1e-6:
+            run.complaints.append(
+                f"{subtask} reports {outcome.duration_s} s while {passed} s passed"
+            )
+        if outcome.status is SkillStatus.REFUSED and not outcome.reason:
+            run.complaints.append(f"{subtask} is refused without a reason")
+        run.observations.append(environment.observe())
+    for observation in run.observations:
+        if observation.time_s < clock:
+            run.complaints.append(f"time went back from {clock} s to {observation.time_s} s")
+        clock = observation.time_s
+        run.complaints += _invalid(observation)
+    return run
+
+
+def _invalid(observation: Observation) -> Iterator[str]:
+    """What the observation types do not check themselves."""
+    for frame in observation.frames:
+        if not (frame.depth_m > 0).any():
+            yield "a frame has no depth at all"
+        ids = frame.instance_ids
+        if ids is None:
+            continue
+        if not np.issubdtype(ids.dtype, np.integer):
+            yield f"instance_ids are {ids.dtype}, not integers"
+        elif ids.min() < -1 or ids.max() >= len(frame.instance_names):
+            yield "instance_ids point beyond instance_names"
+    holding = observation.gripper.holding
+    if holding is not None and not isinstance(holding, str):
+        yield f"gripper.holding is {holding!r}, not a name"
+
+
+def _repeats(
+    what: str, run: _Run, environment: Environment, seed: int, subtasks: Sequence[Subtask]
+) -> list[str]:
+    again = _run(environment, seed, subtasks)
+    complaints = list(dict.fromkeys(run.complaints))
+    if run.outcomes != again.outcomes:
+        complaints.append(f"{what} with seed {seed} give different outcomes")
+    for index, (a, b) in enumerate(zip(run.observations, again.observations, strict=True)):
+        complaints += [
+            f"observation {index}: {name} differs between {what} with seed {seed}"
+            for name in _differences(a, b)
+        ]
+    return complaints
+
+
+def _differences(a: Observation, b: Observation) -> Iterator[str]:
+    if len(a.frames) != len(b.frames):
+        yield "the number of frames"
+        return
+    for one, other in zip(a.frames, b.frames, strict=True):
+        for name in ("rgb", "depth_m", "camera_to_world"):
+            if not np.array_equal(getattr(one, name), getattr(other, name)):
+                yield name
+        if not _same_ids(one.instance_ids, other.instance_ids):
+            yield "instance_ids"
+        if one.instance_names != other.instance_names:
+            yield "instance_names"
+    if a.gripper != b.gripper:
+        yield "the gripper"
+    if a.robot_position_world_m != b.robot_position_world_m:
+        yield "the robot's position"
+    if a.time_s != b.time_s:
+        yield "time"
+
+
+def _same_ids(a: object, b: object) -> bool:
+    if a is None or b is None:
+        return a is b
+    return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b)
+
+
+def _refuses_nonsense(environment: Environment, seed: int) -> Iterator[str]:
+    environment.reset(seed)
+    for skill, roles in SKILLS.items():
+        for name in (NONSENSE, f"{NONSENSE}-7", "", "Mug-99999"):
+            subtask = Subtask(skill, (name,) * len(roles))
+            try:
+                outcome = environment.execute(subtask)
+            except Exception as error:  # noqa: BLE001  (that nothing is raised is what is checked)
+                yield f"{subtask} raises {error!r}; it must be refused with a reason"
+                continue
+            if outcome.status is SkillStatus.SUCCEEDED:
+                yield f"{subtask} succeeds; it must be refused"
+            elif not outcome.reason:
+                yield f"{subtask} is refused without a reason"

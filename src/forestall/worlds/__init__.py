@@ -1,0 +1,1 @@
+"""Worlds that a robot acts in, each a plug-in of its own."""

@@ -1,0 +1,325 @@
+"""The embedded household as an `Environment`: scene, camera, skills, effects, clock.
+
+Joins the geometry (`World` with a camera), a renderer and the truth (`Household`). Calls point
+downwards: `execute` → skills → household → world. Ground truth leaves only through `oracle`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
+from forestall.errors import ForestallError, SceneError
+from forestall.seams import Renderer, World
+from forestall.types.episode import Event, SkillOutcome
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
+from forestall.types.plan import Subtask
+from forestall.types.scene import SceneNeeds
+from forestall.vocabulary import Vocabulary
+from forestall.worlds.kitchen import effects
+from forestall.worlds.kitchen.household import Household, Placed
+from forestall.worlds.kitchen.naming import RefusalError
+from forestall.worlds.kitchen.rendering.memory import FrameMemory
+from forestall.worlds.kitchen.skills import Robot, SkillTimes, perform
+
+SCAN_FRAMES = 7
+"""Views of a full turn; 51° apart at 75° of horizontal view, so that each overlaps the next."""
+
+SCAN_TILT_RAD = math.radians(25.0)
+FLOOR_TILT_RAD = math.radians(62.0)
+"""Shows the floor from 0.05 m to 1.0 m from the robot."""
+
+NECK_RAD = math.radians(80.0)
+"""What is further to the side than this is looked at by turning the base."""
+
+ONE_VIEW_RAD = math.radians(17.0)
+"""Directions this near to a group's middle are looked at in one frame."""
+
+AHEAD_TILT_RAD = math.radians(15.0)
+
+
+class Stage(World, Protocol):
+    """What the environment asks of a world beyond moving things: its contents and its camera."""
+
+    @property
+    def instances(self) -> Iterable[Placed]:
+        """Everything in the scene, prepared things included."""
+
+    @property
+    def data(self) -> Any:
+        """What the renderer draws."""
+
+    @property
+    def robot_position_world_m(self) -> Vec3:
+        """Where the robot stands."""
+
+    @property
+    def robot_yaw_rad(self) -> float:
+        """Its heading, counter-clockwise from +x."""
+
+    @property
+    def gripper_position_world_m(self) -> Vec3:
+        """Where its hand is."""
+
+    def turn_to(self, yaw_rad: float) -> float:
+        """Turn on the spot to a heading; returns the simulated seconds."""
+
+    def position_world_m(self, name: str) -> Vec3 | None:
+        """Middle of a thing's box, None when it is not there."""
+
+    def look_at(self, point_world_m: Sequence[float]) -> npt.NDArray[np.float64]:
+        """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
+
+    def camera_to_world(self, pan_rad: float, tilt_rad: float) -> npt.NDArray[np.float64]:
+        """Camera-to-world pose (4, 4); pan to the left and tilt downwards are positive."""
+
+    def reset(self) -> None:
+        """Everything back to the start of the scene."""
+
+
+Build = Callable[[SceneNeeds, int, Vocabulary], Stage]
+MakeRenderer = Callable[[Stage, Intrinsics], Renderer]
+
+
+class KitchenOracle:
+    """Ground truth of the embedded household, for the benchmark and the oracle perception."""
+
+    def __init__(self, current: Callable[[], Household]) -> None:
+        self._current = current
+
+    def truth(self) -> SceneGraph:
+        """The complete state: every object, every state, containment, what is held."""
+        return self._current().truth()
+
+    def states(self, instance: str) -> Mapping[str, str]:
+        """True attribute values of one instance, empty if there is no such instance now."""
+        return self._current().states(instance)
+
+    def spoiled(self) -> frozenset[str]:
+        """Instances to which something irreversible has happened."""
+        return self._current().spoiled()
+
+    def events(self) -> tuple[Event, ...]:
+        """Everything that has happened since reset, in order."""
+        return self._current().events()
+
+
+class KitchenEnvironment:
+    """One household scene in which a robot looks and acts.
+
+    Args:
+        needs: what the scene must contain.
+        vocabulary: categories and rules.
+        renderer: "auto", or the name of one renderer of the embedded household.
+        intrinsics: of the head camera; 640×480 with 60° of vertical view by default.
+        times: duration of each skill.
+        effect_config: numbers of the automatic effects.
+        build: makes the world of a seed; the embedded MuJoCo kitchen by default.
+        make: makes the renderer of a world; by `renderer` name by default.
+        frames: what was drawn before; everything is drawn anew by default.
+    """
+
+    def __init__(
+        self,
+        needs: SceneNeeds,
+        vocabulary: Vocabulary,
+        renderer: str = "auto",
+        intrinsics: Intrinsics | None = None,
+        *,
+        times: SkillTimes | None = None,
+        effect_config: effects.EffectConfig | None = None,
+        build: Build | None = None,
+        make: MakeRenderer | None = None,
+        frames: FrameMemory | None = None,
+    ) -> None:
+        self._needs = needs
+        self._vocabulary = vocabulary
+        self._intrinsics = intrinsics or Intrinsics.from_vertical_fov(
+            FRAME_WIDTH, FRAME_HEIGHT, VERTICAL_FOV_DEG
+        )
+        self._times = times or SkillTimes()
+        self._effect_config = effect_config or effects.EffectConfig()
+        self._build = build or _build_kitchen
+        self._make = make or _maker(renderer, frames)
+        self._seed: int | None = None
+        self._released: tuple[str, Vec3] | None = None
+        self._world: Stage | None = None
+        self._renderer: Renderer | None = None
+        self._robot: Robot | None = None
+        self.oracle = KitchenOracle(lambda: self._acting.household)
+
+    def reset(self, seed: int) -> None:
+        """Build the scene of this seed, or put it back to its start if it stands already.
+
+        Raises:
+            SceneError: the scene cannot be built as asked.
+        """
+        if self._world is None or seed != self._seed:
+            self._renderer = None
+            self._world = self._build(self._needs, seed, self._vocabulary)
+            self._seed = seed
+        else:
+            self._world.reset()
+        self._released = None
+        household = Household(self._vocabulary, self._world, self._world.instances)
+        self._robot = Robot(household, self._times)
+        effects.settle(household, self._effect_config)
+
+    def scan(self, thorough: bool = False) -> Observation:
+        """Views all around: the base turns once on the spot, which takes its time."""
+        world, household = self._stage, self._acting.household
+        start_rad = world.robot_yaw_rad
+        frames = []
+        for tilt_rad in (SCAN_TILT_RAD, FLOOR_TILT_RAD) if thorough else (SCAN_TILT_RAD,):
+            for k in range(SCAN_FRAMES):
+                world.turn_to(start_rad + 2 * math.pi * k / SCAN_FRAMES)
+                frames.append(self._frame(world.camera_to_world(0.0, tilt_rad)))
+            household.time_s += 4 * self._times.turn_s_per_90deg
+        world.turn_to(start_rad)
+        return self._observation(frames)
+
+    def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
+        """One frame for each group of points, the hand's among them when it holds something.
+
+        The base turns where the neck does not reach, which takes its time.
+        """
+        world = self._stage
+        if self._acting.household.held is not None:
+            focus = (world.gripper_position_world_m, *focus)
+        if not focus:
+            return self._observation([self._frame(world.camera_to_world(0.0, AHEAD_TILT_RAD))])
+        eye = world.look_at(focus[0])[:3, 3]
+        frames = []
+        for aim in _aims(np.asarray(focus, dtype=float) - eye):
+            heading = math.atan2(aim[1], aim[0])
+            if abs(_wrapped(heading - world.robot_yaw_rad)) > NECK_RAD:
+                self._acting.household.time_s += world.turn_to(heading)
+            frames.append(self._frame(world.look_at((eye + aim).tolist())))
+        return self._observation(frames)
+
+    def approach(self, name: str) -> float:
+        """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
+        household = self._acting.household
+        start_s = household.time_s
+        if household.exists(name):
+            with suppress(RefusalError):
+                self._acting.approach(name)
+        return household.time_s - start_s
+
+    def execute(self, subtask: Subtask) -> SkillOutcome:
+        """Run one skill; the automatic effects settle before it (time has passed) and after."""
+        effects.settle(self._acting.household, self._effect_config)
+        held = self._acting.household.held
+        outcome = perform(self._acting, subtask)
+        effects.settle(self._acting.household, self._effect_config)
+        self._released = None
+        if held is not None and self._acting.household.held is None:
+            where = self._stage.position_world_m(held)
+            self._released = None if where is None else (held, where)
+            outcome = replace(outcome, hand_world_m=where)
+        return outcome
+
+    def drop_held(self, hard: bool = False) -> str | None:
+        """Let go of the held object where the robot is; its name, None when nothing fell.
+
+        What falls stays intact, an egg apart, unless the fall is hard. Nothing falls from an empty
+        hand or where there is no free floor.
+        """
+        household = self._acting.household
+        held = household.held
+        if held is None:
+            return None
+        try:
+            household.fall(held)
+        except SceneError:
+            return None
+        effects.crash(household, held, hard)
+        effects.settle(household, self._effect_config)
+        return held
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since reset."""
+        return self._acting.household.time_s
+
+    def close(self) -> None:
+        """Free the scene and the renderer; a later reset builds them again."""
+        self._world = self._renderer = self._robot = self._seed = None
+
+    @property
+    def _acting(self) -> Robot:
+        if self._robot is None:
+            raise ForestallError("the kitchen has no scene yet: call reset(seed) first")
+        return self._robot
+
+    @property
+    def _stage(self) -> Stage:
+        if self._world is None:
+            raise ForestallError("the kitchen has no scene yet: call reset(seed) first")
+        return self._world
+
+    def _frame(self, camera_to_world: npt.NDArray[np.float64]) -> Frame:
+        if self._renderer is None:
+            self._renderer = self._make(self._stage, self._intrinsics)
+        return self._renderer.render(self._stage.data, camera_to_world)
+
+    def _observation(self, frames: Sequence[Frame]) -> Observation:
+        world, household = self._stage, self._acting.household
+        return Observation(
+            frames=tuple(frames),
+            gripper=GripperState(
+                household.held, world.gripper_position_world_m, *(self._released or ())
+            ),
+            time_s=household.time_s,
+            robot_position_world_m=world.robot_position_world_m,
+        )
+
+
+def _aims(ways: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
+    """Directions to look in, one for each group of (n, 3) directions that fit into one view.
+
+    The group of the last direction comes last.
+    """
+    units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    groups: list[list[npt.NDArray[np.float64]]] = []
+    for unit in units:
+        for group in groups:
+            middle = np.mean([*group, unit], axis=0)
+            middle /= np.linalg.norm(middle)
+            if all(float(middle @ u) >= math.cos(ONE_VIEW_RAD) for u in (*group, unit)):
+                group.append(unit)
+                break
+        else:
+            groups.append([unit])
+    last = next(g for g in groups if any((u == units[-1]).all() for u in g))
+    groups = [*(g for g in groups if g is not last), last]
+    return [np.mean(group, axis=0) for group in groups]
+
+
+def _wrapped(angle_rad: float) -> float:
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
+
+
+def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stage:
+    from forestall.worlds.kitchen.model import build_scene
+
+    return build_scene(needs, seed, vocabulary)
+
+
+def _maker(renderer: str, frames: FrameMemory | None) -> MakeRenderer:
+    def make(world: Any, intrinsics: Intrinsics) -> Renderer:
+        from forestall.worlds.kitchen.rendering import make_remembering, make_renderer
+
+        if frames is not None:
+            return make_remembering(renderer, world.model, world.appearance, intrinsics, frames)
+        return make_renderer(renderer, world.model, world.appearance, intrinsics)
+
+    return make

@@ -1,0 +1,87 @@
+import numpy as np
+
+from forestall.testing.conformance import check_environment
+from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.plan import Subtask
+from forestall.types.scene import ObjectNeed, SceneNeeds
+from forestall.vocabulary import household
+from forestall.worlds.kitchen.flat_world import flat_environment
+
+STEPS = [Subtask.parse(s) for s in ("pick_up(Mug)", "put_in(Mug, Sink)", "pick_up(Pot)")]
+
+
+def _make():
+    return flat_environment(SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"),)), household())
+
+
+class _Broken:
+    """Hands everything on to a good environment, and does one thing wrong."""
+
+    def __init__(self) -> None:
+        self._inner = _make()
+
+    def __getattr__(self, name):
+        return getattr(self._inner, name)
+
+
+def test_the_household_conforms():
+    assert check_environment(_make, 3, STEPS) == []
+
+
+def test_a_seed_that_does_not_repeat_is_found():
+    count = iter(range(100))
+
+    class Drifting(_Broken):
+        def reset(self, seed):
+            self._inner.reset(seed + next(count))
+
+    complaints = check_environment(Drifting, 0, STEPS)
+    assert any("with seed 0" in c for c in complaints)
+
+
+def test_a_picture_that_does_not_repeat_is_found():
+    rng = np.random.default_rng(0)
+
+    class Noisy(_Broken):
+        def observe(self, focus=()):
+            observation = self._inner.observe(focus)
+            observation.frames[0].rgb[0, 0, 0] = rng.integers(256)
+            return observation
+
+    assert any("rgb differs" in c for c in check_environment(Noisy, 0, STEPS))
+
+
+def test_an_exception_on_an_unknown_name_is_found():
+    class Raising(_Broken):
+        def execute(self, subtask):
+            if "NoSuchThing" in subtask.args:
+                raise KeyError(subtask.args[0])
+            return self._inner.execute(subtask)
+
+    assert any("raises KeyError" in c for c in check_environment(Raising, 0, STEPS))
+
+
+def test_nonsense_that_succeeds_is_found():
+    class Agreeable(_Broken):
+        def execute(self, subtask):
+            return SkillOutcome(SkillStatus.SUCCEEDED, 0.0)
+
+    assert any("must be refused" in c for c in check_environment(Agreeable, 0, STEPS))
+
+
+def test_a_duration_that_did_not_pass_is_found():
+    class Boasting(_Broken):
+        def execute(self, subtask):
+            outcome = self._inner.execute(subtask)
+            return SkillOutcome(outcome.status, outcome.duration_s + 1.0, outcome.reason)
+
+    assert any("reports" in c for c in check_environment(Boasting, 0, STEPS))
+
+
+def test_a_refusal_without_a_reason_is_found():
+    class Silent(_Broken):
+        def execute(self, subtask):
+            outcome = self._inner.execute(subtask)
+            return SkillOutcome(outcome.status, outcome.duration_s)
+
+    assert any("without a reason" in c for c in check_environment(Silent, 0, STEPS))

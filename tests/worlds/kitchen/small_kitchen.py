@@ -1,0 +1,102 @@
+"""A flat kitchen written down in a few words, and a robot to command in it."""
+
+from collections.abc import Mapping
+
+from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.facts import category_of
+from forestall.types.observation import Intrinsics
+from forestall.types.plan import Subtask
+from forestall.types.scene import SceneNeeds
+from forestall.vocabulary import household
+from forestall.worlds.kitchen.effects import EffectConfig
+from forestall.worlds.kitchen.environment import KitchenEnvironment
+from forestall.worlds.kitchen.flat_world import FlatInstance, FlatRenderer, FlatScene, FlatWorld
+
+FIXTURES = {
+    "CounterTop": 2, "DiningTable": 1, "Sink": 1, "Faucet": 1, "Fridge": 1, "Microwave": 1,
+    "CoffeeMachine": 1, "Toaster": 1, "StoveBurner": 2, "StoveKnob": 2, "Cabinet": 1,
+    "TVStand": 1, "Television": 1, "FloorLamp": 1, "Floor": 1,
+}  # fmt: skip
+PREPARED = {
+    "PotatoSliced": 3, "TomatoSliced": 3, "LettuceSliced": 3, "AppleSliced": 3, "BreadSliced": 3,
+    "EggCracked": 2,
+}  # fmt: skip
+
+
+class SmallKitchen:
+    """`things` read "Mug-1@CounterTop-1 dirty=dirty"; fixtures only state what differs."""
+
+    def __init__(
+        self,
+        *things: str,
+        blocked: Mapping[str, str] | None = None,
+        spots: Mapping[str, int] | None = None,
+        crowded: tuple[str, ...] = (),
+        cool_down_s: float = 300.0,
+    ) -> None:
+        written = [self._parse(t) for t in things]
+        names = {i.name for i in written}
+        fixtures = [
+            FlatInstance(f"{c}-{k}", c)
+            for c, count in FIXTURES.items()
+            for k in range(1, count + 1)
+            if f"{c}-{k}" not in names
+        ]
+        prepared = [
+            FlatInstance(f"{c}-{k}", c, prepared=True)
+            for c, count in PREPARED.items()
+            for k in range(1, count + 1)
+            if f"{c}-{k}" not in names
+        ]
+        scene = FlatScene(
+            (*fixtures, *written, *prepared), blocked or {}, spots or {}, frozenset(crowded)
+        )
+        self.world = FlatWorld(scene)
+        self.env = KitchenEnvironment(
+            SceneNeeds(),
+            household(),
+            intrinsics=Intrinsics.from_vertical_fov(64, 48, 60.0),
+            effect_config=EffectConfig(cool_down_s=cool_down_s),
+            build=lambda needs, seed, vocabulary: self.world,
+            make=lambda world, intrinsics: FlatRenderer(intrinsics),
+        )
+        self.env.reset(0)
+
+    @staticmethod
+    def _parse(text: str) -> FlatInstance:
+        head, *pairs = text.split()
+        name, _, parent = head.partition("@")
+        states = tuple((a, v) for a, _, v in (p.partition("=") for p in pairs))
+        return FlatInstance(name, category_of(name), parent or None, states)
+
+    def do(self, *steps: str) -> SkillOutcome:
+        """Run steps that must all succeed; the last outcome."""
+        for step in steps:
+            outcome = self.env.execute(Subtask.parse(step))
+            assert outcome.status is SkillStatus.SUCCEEDED, f"{step}: {outcome.reason}"
+        return outcome
+
+    def refused(self, step: str) -> str:
+        """Run a step that must be refused without any change of the truth; its reason."""
+        before = self.env.oracle.truth().text(), self.env.oracle.spoiled()
+        outcome = self.env.execute(Subtask.parse(step))
+        assert outcome.status is SkillStatus.REFUSED, step
+        assert (self.env.oracle.truth().text(), self.env.oracle.spoiled()) == before
+        return outcome.reason
+
+    def state(self, name: str, attribute: str) -> str | None:
+        return self.env.oracle.states(name).get(attribute)
+
+    def parent(self, name: str) -> str | None:
+        return next(iter(self.env.oracle.truth().parents(name)), None)
+
+    @property
+    def held(self) -> str | None:
+        return self.env.oracle.truth().holding
+
+    @property
+    def spoiled(self) -> set[str]:
+        return set(self.env.oracle.spoiled())
+
+    def kinds(self) -> list[str]:
+        return [e.kind for e in self.env.oracle.events()]

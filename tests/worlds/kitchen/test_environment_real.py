@@ -1,0 +1,100 @@
+"""The rules on the real geometry, seen through the real renderer."""
+
+import numpy as np
+import pytest
+
+from forestall.errors import SceneError
+from forestall.testing.conformance import check_environment
+from forestall.types.episode import SkillStatus
+from forestall.types.observation import Intrinsics
+from forestall.types.plan import Subtask
+from forestall.types.scene import ObjectNeed, SceneNeeds
+from forestall.vocabulary import household
+from forestall.worlds.kitchen.environment import SCAN_FRAMES, KitchenEnvironment
+
+SMALL = Intrinsics.from_vertical_fov(96, 72, 60.0)
+NEEDS = SceneNeeds(
+    objects=(
+        ObjectNeed("Mug-1", "Mug", ("CounterTop",)),
+        ObjectNeed("Egg-1", "Egg", ("CounterTop",)),
+        ObjectNeed("Pan-1", "Pan", ("StoveBurner-1",)),
+    )
+)
+
+
+def _make():
+    return KitchenEnvironment(NEEDS, household(), intrinsics=SMALL)
+
+
+@pytest.fixture(scope="module")
+def env():
+    return _make()
+
+
+def _do(env, *steps):
+    for step in steps:
+        outcome = env.execute(Subtask.parse(step))
+        assert outcome.status is SkillStatus.SUCCEEDED, f"{step}: {outcome.reason}"
+
+
+def test_the_kitchen_conforms():
+    steps = [Subtask.parse(s) for s in ("pick_up(Mug)", "put_in(Mug, Sink)", "open_obj(Fridge)")]
+    assert check_environment(_make, 5, steps) == []
+
+
+def test_a_scan_looks_all_around_and_leaves_the_robot_as_it_was(env):
+    env.reset(5)
+    before = env.observe()
+    scan = env.scan()
+    after = env.observe()
+    ahead = np.array([f.camera_to_world[:2, 2] for f in scan.frames])
+    yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    assert len(yaw) == SCAN_FRAMES
+    assert np.allclose(np.diff(yaw), 2 * np.pi / SCAN_FRAMES)
+    assert np.array_equal(before.frames[0].rgb, after.frames[0].rgb)
+    assert np.array_equal(before.frames[0].camera_to_world, after.frames[0].camera_to_world)
+    seen = {f.instance_names[i] for f in scan.frames for i in np.unique(f.instance_ids) if i >= 0}
+    assert {"Fridge-1", "Pan-1"} <= seen
+
+
+def test_truth_has_boxes_where_things_are(env):
+    env.reset(5)
+    truth = env.oracle.truth()
+    pan, burner = truth.get("Pan-1"), truth.get("StoveBurner-1")
+    assert pan.box_m.low[2] >= burner.box_m.high[2] - 0.01
+    assert abs(pan.box_m.centre[0] - burner.box_m.centre[0]) < 0.2
+
+
+def test_a_held_egg_cracks_into_the_pan_it_is_over(env):
+    env.reset(5)
+    _do(env, "pick_up(Egg)", "navigate_to_obj(Pan)", "crack_obj(Egg)")
+    truth = env.oracle.truth()
+    assert truth.parents("EggCracked-1") == ("Pan-1",)
+    egg, pan = truth.get("EggCracked-1").box_m, truth.get("Pan-1").box_m
+    assert pan.low[0] <= egg.centre[0] <= pan.high[0]
+    assert pan.low[1] <= egg.centre[1] <= pan.high[1]
+    assert truth.get("Egg-1") is None
+
+
+def test_a_dropped_egg_is_cracked_on_the_floor(env):
+    env.reset(5)
+    _do(env, "pick_up(Egg)", "navigate_to_obj(Fridge)")
+    assert env.drop_held() == "Egg-1"
+    truth = env.oracle.truth()
+    assert truth.parents("EggCracked-1") == ("Floor-1",)
+    assert truth.get("EggCracked-1").box_m.high[2] < 0.05
+
+
+def test_a_dropped_mug_lies_on_the_floor_and_can_be_picked_up(env):
+    env.reset(5)
+    _do(env, "pick_up(Mug)", "navigate_to_obj(Fridge)")
+    env.drop_held()
+    assert env.oracle.truth().get("Mug-1").box_m.low[2] < 0.02
+    _do(env, "pick_up(Mug)", "put_on(Mug, CounterTop)")
+    assert env.oracle.truth().get("Mug-1").box_m.low[2] > 0.5
+
+
+def test_what_is_named_wrongly_at_building_is_a_clear_error():
+    needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug", ("Toaster",)),))
+    with pytest.raises(SceneError, match="Toaster does not take a Mug"):
+        KitchenEnvironment(needs, household()).reset(0)
