@@ -3,7 +3,8 @@
 ForestallError
 ├── InputError             what the user gave is not valid; one line that says what would be
 │   ├── UnknownNameError   a name that is not known, with the nearest known ones
-│   └── FileFormatError    a file that cannot be read as what it should be
+│   ├── FileFormatError    a file that cannot be read as what it should be
+│   └── DomainError        a domain that contradicts itself, or that something does not fit
 ├── MemoryFileError        the demonstration file is empty, of another version, damaged or locked
 ├── ModelFileError         a model is missing or damaged, or cannot be run here
 ├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
@@ -51,6 +52,10 @@ class UnknownNameError(InputError):
 
 class FileFormatError(InputError):
     """A file that cannot be read as what it should be."""
+
+
+class DomainError(InputError):
+    """A domain that contradicts itself, or something that does not fit its domain."""
 
 
 class MemoryFileError(ForestallError):

@@ -1,0 +1,1 @@
+"""Skills as a planning domain: validate any plan, ground, search, export."""

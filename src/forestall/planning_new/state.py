@@ -1,0 +1,375 @@
+"""The symbolic state: what planning believes about the things of one scene graph.
+
+Built from a `SceneGraph` and a `Domain`; read by `execute`, the validator, the planner and the
+replanner. It answers every formula of the domain with yes or no.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from forestall.domain.evaluate import TRUE, by_number, evaluate, literal_truth, number_of
+from forestall.domain.formula import Formula
+from forestall.domain.model import FACING, LOCATED, Category, Domain, PredicateKind
+from forestall.types.facts import Literal, category_of, is_instance
+from forestall.types.graph import SceneGraph
+
+__all__ = ["Place", "State", "by_number", "number_of"]
+
+CROWDED = 0.6
+"""Share of a support's footprint from which on another one is preferred."""
+
+Fact = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a thing is: a containing relation and the thing that has it."""
+
+    relation: str
+    parent: str
+
+
+class State:
+    """What holds at one moment (implements `evaluate.View`, with two values only).
+
+    `execute.apply` copies it and never changes the one it was given.
+
+    Args:
+        domain: what its names mean.
+        kinds: thing → category; whatever is not here does not exist.
+        values: (thing, attribute) → value.
+        facts: relations and histories that hold, (predicate, *arguments).
+        at: the last thing that was driven to or handled.
+        lost: things whose place is not known.
+        hidden: containers whose inside was not observed and is assumed empty.
+        crowded: supports with little free area, as far as the boxes of the graph tell.
+        assumed: facts that were not observed and are taken from the domain.
+    """
+
+    __slots__ = (
+        "_index", "_kind_index", "assumed", "at", "crowded", "domain", "facts", "hidden", "kinds",
+        "lost", "values",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        domain: Domain,
+        kinds: dict[str, str],
+        values: dict[tuple[str, str], str] | None = None,
+        facts: Iterable[Fact] = (),
+        at: str | None = None,
+        lost: frozenset[str] = frozenset(),
+        hidden: frozenset[str] = frozenset(),
+        crowded: frozenset[str] = frozenset(),
+        assumed: frozenset[Literal] = frozenset(),
+    ) -> None:
+        self.domain, self.kinds = domain, kinds
+        self.values = {} if values is None else values
+        self.facts: set[Fact] = set()
+        self._index: dict[tuple[str, int, str], set[Fact]] = {}
+        self._kind_index: dict[str, tuple[str, ...]] = {}
+        for fact in facts:
+            self.add(fact)
+        self.at, self.lost, self.hidden = at, lost, hidden
+        self.crowded, self.assumed = crowded, assumed
+
+    @classmethod
+    def from_graph(cls, graph: SceneGraph, domain: Domain) -> State:
+        """Read a scene graph; nodes of categories that the domain lacks are left out.
+
+        An unobserved attribute takes its default and is listed in `assumed`, as is the emptiness
+        of every hidden container. A thing with neither box nor place is lost.
+        """
+        state = cls(domain, {})
+        roles, hands = domain.roles, domain.robot.hands
+        lost, assumed = set(), set()
+        held = {r.subject for r in graph.relations if r.predicate == roles.holding}
+        placed = held | {r.subject for r in graph.relations if r.predicate in domain.containing}
+        for node in graph.nodes:
+            category = domain.categories.get(node.category)
+            if node.id in hands or category is None:
+                continue
+            state.kinds[node.id] = node.category
+            for attribute, default in domain.default_states(node.category).items():
+                value = node.state(attribute)
+                if value is None:
+                    assumed.add(Literal(attribute, (node.id,), default))
+                state.values[node.id, attribute] = default if value is None else value
+            loose = node.box_m is None and node.id not in placed
+            if loose and roles.fixture not in category.tags:
+                lost.add(node.id)
+        for r in graph.relations:
+            if r.subject not in state.kinds or r.predicate in domain.containing:
+                continue
+            if r.predicate in domain.moved and (r.object in state.kinds or r.object in hands):
+                state.add((r.predicate, r.subject, r.object))
+        for name, place in _places(graph, state).items():
+            state.add((place.relation, name, place.parent))
+        state.lost = frozenset(lost)
+        state.hidden = frozenset(h for h in graph.hidden if h in state.kinds)
+        if roles.vacant is not None:
+            assumed |= {Literal(roles.vacant, (h,)) for h in state.hidden}
+        state.assumed = frozenset(assumed)
+        state.crowded = _crowded(graph, domain)
+        return state
+
+    def copy(self) -> State:
+        """An independent copy."""
+        other = State.__new__(State)
+        other.domain, other.kinds, other.values = self.domain, dict(self.kinds), dict(self.values)
+        other.facts = set(self.facts)
+        other._index = {k: set(v) for k, v in self._index.items()}
+        other._kind_index = self._kind_index
+        other.at, other.lost, other.hidden = self.at, self.lost, self.hidden
+        other.crowded, other.assumed = self.crowded, self.assumed
+        return other
+
+    # --- changes ---------------------------------------------------------------------------------
+
+    def add(self, fact: Fact) -> None:
+        """Let a fact hold; others of its group end for the same first argument."""
+        if fact in self.facts:
+            return
+        group = self.domain.predicates[fact[0]].group
+        if group is not None:
+            for name, other in self.domain.relations.items():
+                if other.group == group:
+                    for old in tuple(self._index.get((name, 0, fact[1]), ())):
+                        self.remove(old)
+        self.facts.add(fact)
+        for position, arg in enumerate(fact[1:]):
+            self._index.setdefault((fact[0], position, arg), set()).add(fact)
+
+    def remove(self, fact: Fact) -> None:
+        """Let a fact end."""
+        if fact not in self.facts:
+            return
+        self.facts.discard(fact)
+        for position, arg in enumerate(fact[1:]):
+            key = (fact[0], position, arg)
+            self._index[key].discard(fact)
+            if not self._index[key]:
+                del self._index[key]
+
+    def set_value(self, name: str, attribute: str, value: str) -> None:
+        """Change an attribute of a thing that has it; what was assumed about it is settled."""
+        old = self.values.get((name, attribute))
+        if old is None:
+            return
+        self.values[name, attribute] = value
+        if self.assumed:
+            self.assumed -= {Literal(attribute, (name,), old)}
+
+    def create(self, name: str, category: str) -> None:
+        """A new thing with the defaults of its category."""
+        self.kinds[name] = category
+        self._kind_index = {}
+        for attribute, value in self.domain.default_states(category).items():
+            self.values[name, attribute] = value
+
+    def take_away(self, name: str) -> None:
+        """A thing is no more; histories of it stay."""
+        del self.kinds[name]
+        self._kind_index = {}
+        for key in [k for k in self.values if k[0] == name]:
+            del self.values[key]
+        histories = self.domain.histories
+        for fact in [f for f in self.facts if name in f[1:] and f[0] not in histories]:
+            self.remove(fact)
+
+    # --- what evaluate asks ----------------------------------------------------------------------
+
+    def things(self) -> Iterable[str]:
+        """Everything that exists."""
+        return self.kinds
+
+    def category(self, name: str) -> str:
+        """The category name of a thing, that of its name for what does not exist."""
+        return self.kinds.get(name) or self.domain.canonical(category_of(name))
+
+    def of_kind(self, kind: str) -> Iterable[str]:
+        """Things that count as a tag, a category or an attribute holder."""
+        found = self._kind_index.get(kind)
+        if found is None:
+            kinds = self.domain.kinds
+            found = tuple(n for n, c in self.kinds.items() if kind in kinds(c))
+            self._kind_index[kind] = found
+        return found
+
+    def fact(self, predicate: str, args: tuple[str, ...]) -> int:
+        """Whether a relation, a history or a built-in fact holds."""
+        if predicate == LOCATED:
+            return TRUE if args[0] not in self.lost and args[0] in self.kinds else 0
+        if predicate == FACING:
+            return TRUE if self.at == args[0] else 0
+        return TRUE if (predicate, *args) in self.facts else 0
+
+    def value(self, name: str, attribute: str) -> str | None:
+        """The value of an attribute, None where the thing does not have it."""
+        return self.values.get((name, attribute))
+
+    def unsure(self, name: str, attribute: str) -> bool:
+        """Nothing is unsure here."""
+        return False
+
+    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Iterable[str]:
+        """What stands at a position of a relation, the rest being given."""
+        if len(args) == 1:
+            return [f[1] for f in self.facts if f[0] == predicate]
+        given = next(i for i in range(len(args)) if i != position)
+        found = self._index.get((predicate, given, args[given]), ())
+        return sorted(
+            {
+                f[position + 1]
+                for f in found
+                if all(i == position or a.startswith("?") or f[i + 1] == a
+                       for i, a in enumerate(args))
+            }
+        )  # fmt: skip
+
+    def with_value(self, attribute: str, value: str) -> Iterable[str]:
+        """Things whose attribute has a value."""
+        values = self.values
+        return [n for n in self.of_kind(f"has_{attribute}") if values[n, attribute] == value]
+
+    # --- questions -------------------------------------------------------------------------------
+
+    def kind(self, name: str) -> Category:
+        """The category of an existing thing."""
+        return self.domain.categories[self.kinds[name]]
+
+    def true(self, formula: Formula, names: dict[str, str] | None = None) -> bool:
+        """Whether a formula holds under a binding of its variables."""
+        return evaluate(formula, self, names or {}) == TRUE
+
+    def says(self, predicate: str | None, *args: str) -> bool:
+        """Whether a fact holds, derived ones too; False for a role that the domain lacks."""
+        return predicate is not None and literal_truth(Literal(predicate, args), self, {}) == TRUE
+
+    @property
+    def held(self) -> str | None:
+        """What the first hand that holds something holds."""
+        return next((h for _, h in self.in_hands()), None)
+
+    def in_hands(self) -> Iterator[tuple[str, str]]:
+        """(hand, thing) for every hand that holds something."""
+        holding = self.domain.roles.holding
+        for hand in self.domain.robot.hands if holding else ():
+            for fact in sorted(self._index.get((holding or "", 1, hand), ())):
+                yield hand, fact[1]
+
+    def instances(self, category: str) -> tuple[str, ...]:
+        """Existing things of a category, lowest number first."""
+        if category not in self.domain.categories:
+            return ()
+        found = [n for n in self.of_kind(category) if self.kinds[n] == category]
+        return tuple(sorted(found, key=by_number))
+
+    def contents(self, name: str) -> tuple[str, ...]:
+        """What is directly in, on or at a thing."""
+        found = {f[1] for r in self.domain.containing for f in self._index.get((r, 1, name), ())}
+        return tuple(sorted(found, key=by_number))
+
+    def place(self, name: str) -> Place | None:
+        """Where a thing is."""
+        for relation in self.domain.containing:
+            for fact in self._index.get((relation, 0, name), ()):
+                return Place(relation, fact[2])
+        return None
+
+    def chain(self, name: str) -> Iterator[Place]:
+        """Where a thing is, where that is, and so on upwards."""
+        seen = {name}
+        place = self.place(name)
+        while place is not None and place.parent not in seen:
+            yield place
+            seen.add(place.parent)
+            place = self.place(place.parent)
+
+    def root(self, name: str) -> str:
+        """The outermost thing that has `name`, itself included."""
+        return next((p.parent for p in reversed(list(self.chain(name)))), name)
+
+    def matches(self, name: str) -> tuple[str, ...]:
+        """Existing things that an instance or category name can mean."""
+        if name in self.kinds:
+            return (name,)
+        canonical = self.domain.canonical(name)
+        return (canonical,) if canonical in self.kinds else self.instances(canonical)
+
+    def holds(self, literal: Literal) -> bool:
+        """Whether a literal holds; a category name means "some instance of it".
+
+        With the value "false" no instance may make it true. What no skill is about never holds.
+        """
+        if not decided(self.domain, literal):
+            return False
+        hands = self.domain.robot.hands
+        choices = [
+            (a,) if a in hands else (self.matches(a) or ((a,) if is_instance(a) else ()))
+            for a in literal.args
+        ]
+        positive = Literal(literal.predicate, literal.args, "true")
+        wanted = positive if literal.value == "false" else literal
+        found = any(
+            literal_truth(Literal(wanted.predicate, c, wanted.value), self, {}) == TRUE
+            for c in product(*choices)
+        )
+        return not found if literal.value == "false" else found
+
+
+def decided(domain: Domain, literal: Literal) -> bool:
+    """Whether a state decides a literal; relations that no skill is about are geometry."""
+    known = domain.predicates.get(literal.predicate)
+    if known is None:
+        return literal.predicate == LOCATED or domain.known_kind(literal.predicate)
+    return known.kind is not PredicateKind.RELATION or literal.predicate in domain.moved
+
+
+def _crowded(graph: SceneGraph, domain: Domain) -> frozenset[str]:
+    """Supports whose contents cover more than `CROWDED` of their own footprint."""
+    covered: dict[str, float] = {}
+    area_m2 = {n.id: n.box_m.size[0] * n.box_m.size[1] for n in graph.nodes if n.box_m is not None}
+    for r in graph.relations:
+        if r.predicate in domain.containing and domain.is_a(r.object, domain.roles.support):
+            covered[r.object] = covered.get(r.object, 0.0) + area_m2.get(r.subject, 0.0)
+    return frozenset(x for x, a in covered.items() if x in area_m2 and a > CROWDED * area_m2[x])
+
+
+def _places(graph: SceneGraph, state: State) -> dict[str, Place]:
+    """One place for each thing: the innermost of several, the ground last, no cycles."""
+    domain = state.domain
+    held = {h for _, h in state.in_hands()}
+    order = {relation: i for i, relation in enumerate(domain.containing)}
+    edges: dict[str, list[Place]] = {}
+    for r in graph.relations:
+        known = r.subject in state.kinds and r.object in state.kinds and r.subject not in held
+        if known and r.predicate in order:
+            edges.setdefault(r.subject, []).append(Place(r.predicate, r.object))
+    places: dict[str, Place] = {}
+    for name in sorted(edges, key=by_number):
+        if domain.roles.fixture in state.kind(name).tags:
+            continue
+        parents = {p.parent for p in edges[name]}
+        outer = {q.parent for p in parents for q in edges.get(p, ())}
+        ranked = sorted(
+            edges[name],
+            key=lambda p: (
+                p.parent in outer,
+                domain.is_a(state.kinds[p.parent], domain.roles.ground),
+                order[p.relation],
+                by_number(p.parent),
+            ),
+        )
+        for place in ranked:
+            above, seen = place.parent, {name}
+            while above not in seen and above in places:
+                seen.add(above)
+                above = places[above].parent
+            if above not in seen:
+                places[name] = place
+                break
+    return places
