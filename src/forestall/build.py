@@ -17,6 +17,7 @@ from typing import Any
 import forestall
 from forestall.comparison.preconditions import MiningConfig
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
+from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.memory.retrieval import RetrievalConfig
 from forestall.parts import (
@@ -47,7 +48,6 @@ from forestall.tasks.truth import TruthTrace
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Plan
-from forestall.vocabulary import Vocabulary
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
 
@@ -78,7 +78,7 @@ class Prepared:
     @property
     def plan(self) -> Plan:
         """The plan to start with: the nominal one with the scenario's changes."""
-        return apply_plan_faults(self.loaded.task.plan, self.faults)
+        return apply_plan_faults(self.loaded.task.plan, self.faults, self.loaded.domain)
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -112,8 +112,8 @@ def prepare(config: RunConfig) -> Prepared:
     prepared = Prepared(config, loaded, scenario)
     if scenario is not None:
         try:
-            apply_scene_faults(loaded.task.scene, prepared.faults, loaded.vocabulary)
-            check_steps(prepared.plan, prepared.faults, loaded.vocabulary)
+            apply_scene_faults(loaded.task.scene, prepared.faults, loaded.domain)
+            check_steps(prepared.plan, prepared.faults, loaded.domain)
             scenario.moments(prepared.plan)
         except InputError as error:
             raise InputError(f"scenario {scenario.name}: {error}") from error
@@ -139,23 +139,23 @@ def run_episode(
         frames: pictures that were drawn before.
     """
     config, loaded, task = prepared.config, prepared.loaded, prepared.loaded.task
-    needs = apply_scene_faults(task.scene, prepared.faults, loaded.vocabulary)
-    kitchen = KitchenEnvironment(needs, loaded.vocabulary, config.renderer, frames=frames)
+    needs = apply_scene_faults(task.scene, prepared.faults, loaded.domain)
+    kitchen = KitchenEnvironment(needs, loaded.domain, config.renderer, frames=frames)
     if trace is not None:
-        trace.attach(kitchen.oracle, loaded.vocabulary)
+        trace.attach(kitchen.oracle, loaded.domain)
         listeners = (*listeners, trace)
     try:
         perceiver = GraphPerceiver(
             load("segmenter", config.segmenter)(),
-            _state_estimator(config.states, kitchen, loaded.vocabulary),
-            loaded.vocabulary,
+            _state_estimator(config.states, kitchen, loaded.domain),
+            loaded.domain,
             image_encoder=node_encoder(config),
         )
         runtime = Runtime(
-            wrap(kitchen, prepared.faults, kitchen, loaded.vocabulary),
+            wrap(kitchen, prepared.faults, kitchen, loaded.domain),
             perceiver,
-            make_strategy(config, loaded.vocabulary, demonstrations),
-            loaded.vocabulary,
+            make_strategy(config, loaded.domain, demonstrations),
+            loaded.domain,
             listeners,
             RuntimeConfig(keep_observations=config.keep_observations, final_look=config.final_look),
         )
@@ -164,7 +164,7 @@ def run_episode(
             prepared.plan,
             config.seed,
             None if prepared.scenario is None else prepared.scenario.name,
-            _scorer(kitchen),
+            _scorer(kitchen, loaded.domain),
             (
                 *provenance(config),
                 ("memory", memory),
@@ -201,23 +201,24 @@ def _version(package: str) -> str | None:
         return None
 
 
-def _state_estimator(name: str, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> Any:
+def _state_estimator(name: str, kitchen: KitchenEnvironment, domain: Domain) -> Any:
     if name == "oracle":
-        unseen = [a.name for a in vocabulary.attributes.values() if not a.camera]
-        return load("states", name)(kitchen.oracle.states, not_visible=unseen)
-    return make_state_estimator(name, vocabulary)
+        return load("states", name)(kitchen.oracle.states, domain)
+    return make_state_estimator(name, domain)
 
 
-def _scorer(kitchen: KitchenEnvironment) -> Callable[[EpisodeRecord], EpisodeRecord]:
+def _scorer(
+    kitchen: KitchenEnvironment, domain: Domain
+) -> Callable[[EpisodeRecord], EpisodeRecord]:
     def score(record: EpisodeRecord) -> EpisodeRecord:
-        strict, weak, failures = TruthGoalChecker().check(record.task.goal, kitchen.oracle)
+        strict, weak, failures = TruthGoalChecker(domain).check(record.task.goal, kitchen.oracle)
         return replace(
             record,
             success=strict,
             weak_success=weak,
             failures=(*record.failures, *failures),
             events=kitchen.oracle.events(),
-            harmed=irreversible(record.task.goal, kitchen.oracle),
+            harmed=irreversible(record.task.goal, kitchen.oracle, domain),
         )
 
     return score

@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+DEFAULT_DOMAIN = "household"
+"""The domain of files and commands that name none."""
+
 FRAME_WIDTH = 640
 FRAME_HEIGHT = 480
 VERTICAL_FOV_DEG = 60.0

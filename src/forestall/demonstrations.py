@@ -92,7 +92,7 @@ def record_one(job: RecordingJob) -> Demonstration:
             final_look=True,
         )
         prepared = prepare(config)
-        viewer = make_viewer(config, prepared.loaded.vocabulary)
+        viewer = make_viewer(config, prepared.loaded.domain)
         record = run_episode(prepared, None)
         demonstration = demonstration_from(record, forestall.__version__, view_of=viewer)
         if demonstration is not None:

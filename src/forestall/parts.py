@@ -15,6 +15,7 @@ from forestall.comparison.preconditions import mine, violations
 from forestall.comparison.score import BatchScorer, ScoreConfig
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.domain.model import Domain
 from forestall.embeddings.views import view_of
 from forestall.errors import InputError, UnknownNameError
 from forestall.memory.retrieval import EmbeddingRetriever
@@ -35,7 +36,6 @@ from forestall.seams import (
 )
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
-from forestall.vocabulary import Vocabulary
 
 STATES = "learned"
 """Where object states come from when nothing is said."""
@@ -127,7 +127,7 @@ def check_parts(config: RunConfig) -> None:
 
 
 def make_strategy(
-    config: RunConfig, vocabulary: Vocabulary, demonstrations: Sequence[Demonstration] | None
+    config: RunConfig, domain: Domain, demonstrations: Sequence[Demonstration] | None
 ) -> Strategy:
     """The strategy with its collaborators."""
     kind = load("strategy", config.strategy)
@@ -138,59 +138,59 @@ def make_strategy(
             f"strategy {config.strategy!r} compares with demonstrations, and the memory has none"
         )
     _check_features(config, demonstrations)
-    retriever = EmbeddingRetriever(demonstrations, load("encoder", config.encoder)())
+    retriever = EmbeddingRetriever(demonstrations, load("encoder", config.encoder)(), domain)
     if config.strategy == "watch":
-        reasoner = SymbolicReasoner(mine, violations, vocabulary)
-        return kind(retriever, make_watchers(config, vocabulary), reasoner)  # type: ignore[no-any-return]
+        reasoner = SymbolicReasoner(mine, violations, domain)
+        return kind(retriever, make_watchers(config, domain), reasoner)  # type: ignore[no-any-return]
     parts: list[Any] = [
         retriever,
-        make_detector(config, vocabulary),
-        make_reasoner(config, vocabulary),
-        make_replanner(config, vocabulary),
-        GraphValidator(vocabulary),
+        make_detector(config, domain),
+        make_reasoner(config, domain),
+        make_replanner(config, domain),
+        GraphValidator(domain),
     ]
     if config.strategy in ("online", "online-scene"):
-        parts.append(partial(scope, vocabulary=vocabulary, config=ScopeConfig()))
+        parts.append(partial(scope, domain=domain, config=ScopeConfig()))
     return kind(*parts)  # type: ignore[no-any-return]
 
 
-def make_reasoner(config: RunConfig, vocabulary: Vocabulary) -> Reasoner:
+def make_reasoner(config: RunConfig, domain: Domain) -> Reasoner:
     """What explains a mismatch; the goal alone where reasoning is left out."""
     if config.without == "reasoning":
         from forestall.diagnosis.none import NoReasoning
 
-        return NoReasoning(vocabulary)
-    return SymbolicReasoner(mine, violations, vocabulary)
+        return NoReasoning(domain)
+    return SymbolicReasoner(mine, violations, domain)
 
 
-def make_replanner(config: RunConfig, vocabulary: Vocabulary) -> Replanner:
+def make_replanner(config: RunConfig, domain: Domain) -> Replanner:
     """What corrects the plan: all of it anew where no reason is known.
 
     Where validation is left out, the first plan that is found is taken unchecked.
     """
-    validator: PlanValidator = GraphValidator(vocabulary)
+    validator: PlanValidator = GraphValidator(domain)
     if config.without == "validation":
         validator = AcceptAll()
     if config.without == "reasoning":
         from forestall.replanning.anew import GoalReplanner
 
-        return GoalReplanner(validator, vocabulary)
-    return PlannerReplanner(validator, vocabulary)
+        return GoalReplanner(validator, domain)
+    return PlannerReplanner(validator, domain)
 
 
-def make_detector(config: RunConfig, vocabulary: Vocabulary) -> Detector:
+def make_detector(config: RunConfig, domain: Domain) -> Detector:
     """The detector that a run's strategy asks."""
     threshold = DetectorConfig(threshold=config.threshold)
     kind = load("detector", config.detector)
     if config.detector == "scene-graph":
-        scorer = BatchScorer(score_options(config), load("encoder", config.encoder)())
+        scorer = BatchScorer(score_options(config), load("encoder", config.encoder)(), domain)
         return kind(scorer, threshold, name=watch_name(config.without))  # type: ignore[no-any-return]
     if config.detector == "image":
         return kind(make_image_encoder(config.image_encoder), threshold)  # type: ignore[no-any-return]
     if config.detector == "caption":
         text = load("encoder", config.encoder)()
-        return kind(make_captioner(config.captioner, vocabulary), text, threshold)  # type: ignore[no-any-return]
-    return kind(threshold)  # type: ignore[no-any-return]
+        return kind(make_captioner(config.captioner, domain), text, threshold)  # type: ignore[no-any-return]
+    return kind(domain, threshold)  # type: ignore[no-any-return]
 
 
 def watch_name(without: str | None) -> str:
@@ -200,7 +200,7 @@ def watch_name(without: str | None) -> str:
     return f"{SceneGraphDetector.name} without {without.replace('-', ' ')}"
 
 
-def make_watchers(config: RunConfig, vocabulary: Vocabulary) -> list[Detector]:
+def make_watchers(config: RunConfig, domain: Domain) -> list[Detector]:
     """Every detector and every ablation of the score; the paper's own first."""
     choices = [replace(config, detector="scene-graph", without=None)]
     choices += [replace(config, detector="scene-graph", without=part) for part in SCORE_WITHOUT]
@@ -209,7 +209,7 @@ def make_watchers(config: RunConfig, vocabulary: Vocabulary) -> list[Detector]:
         for name in known("detector")
         if name != "scene-graph"
     ]
-    return [make_detector(choice, vocabulary) for choice in choices]
+    return [make_detector(choice, domain) for choice in choices]
 
 
 def score_options(config: RunConfig) -> ScoreConfig:
@@ -219,10 +219,10 @@ def score_options(config: RunConfig) -> ScoreConfig:
     return options if off is None else replace(options, **{off: False})  # type: ignore[arg-type]
 
 
-def make_captioner(name: str, vocabulary: Vocabulary) -> Captioner:
+def make_captioner(name: str, domain: Domain) -> Captioner:
     """What describes pictures in words."""
     if name == "listing":
-        return load("captioner", name)(vocabulary)  # type: ignore[no-any-return]
+        return load("captioner", name)(domain)  # type: ignore[no-any-return]
     return _captioning_model(name)
 
 
@@ -232,12 +232,10 @@ def _captioning_model(name: str) -> Captioner:
     return load("captioner", name)()  # type: ignore[no-any-return]
 
 
-def make_viewer(
-    config: RunConfig, vocabulary: Vocabulary
-) -> Callable[[BoundaryRecord], View | None]:
+def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord], View | None]:
     """What keeps the pictures of a run as views: an image feature and a caption."""
     encoder = make_image_encoder(config.image_encoder)
-    captioner = make_captioner(config.captioner, vocabulary)
+    captioner = make_captioner(config.captioner, domain)
 
     def view(boundary: BoundaryRecord) -> View | None:
         if boundary.observation is None:
@@ -247,11 +245,11 @@ def make_viewer(
     return view
 
 
-def make_state_estimator(name: str, vocabulary: Vocabulary) -> StateEstimator:
+def make_state_estimator(name: str, domain: Domain) -> StateEstimator:
     """An estimator that sees pixels only: a shipped one with its encoder, or somebody else's."""
     kind = load("states", name)
     if name in STATE_ENCODERS:
-        return kind(make_image_encoder(STATE_ENCODERS[name]), vocabulary)  # type: ignore[no-any-return]
+        return kind(make_image_encoder(STATE_ENCODERS[name]), domain)  # type: ignore[no-any-return]
     return kind()  # type: ignore[no-any-return]
 
 

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from forestall.domain.names import executable, ground_subtask
 from forestall.errors import ForestallError
-from forestall.grounding import executable, ground_subtask, is_open_support
 from forestall.types.episode import (
     BoundaryRecord,
     EpisodeEnd,
@@ -33,8 +33,8 @@ from forestall.types.verdict import Decision
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from forestall.domain.model import Domain
     from forestall.seams import Environment, Listener, Perceiver, Strategy
-    from forestall.vocabulary import Vocabulary
 
 Score = Callable[[EpisodeRecord], EpisodeRecord]
 
@@ -99,14 +99,14 @@ class Runtime:
         environment: Environment,
         perceiver: Perceiver,
         strategy: Strategy,
-        vocabulary: Vocabulary,
+        domain: Domain,
         listeners: Sequence[Listener] = (),
         config: RuntimeConfig | None = None,
     ) -> None:
         self._environment = environment
         self._perceiver = perceiver
         self._strategy = strategy
-        self._vocabulary = vocabulary
+        self._domain = domain
         self._listeners = tuple(listeners)
         self._config = config or RuntimeConfig()
 
@@ -288,7 +288,7 @@ class Runtime:
 
     def _execute(self, episode: _Episode, context: BoundaryContext) -> StrategyAnswer:
         planned = episode.plan.subtasks[episode.index]
-        command = executable(context.subtask, planned, self._vocabulary)
+        command = executable(context.subtask, planned, self._domain)
         with episode.phase("act"):
             outcome = self._environment.execute(command)
         for name in context.subtask.args:
@@ -324,7 +324,7 @@ class Runtime:
         return ground_subtask(
             episode.plan.subtasks[episode.index],
             episode.graph,
-            self._vocabulary,
+            self._domain,
             episode.robot_world_m,
             episode.bound,
         )
@@ -338,10 +338,10 @@ class Runtime:
         subtask = self._ground(episode)
         node = episode.graph.get(subtask.args[-1])
         if (
-            subtask.skill == "navigate_to_obj"
+            self._domain.skill(subtask.skill).drives
             or node is None
             or node.centroid_m is None
-            or is_open_support(self._vocabulary, node.category)
+            or self._domain.is_open_support(node.category)
         ):
             return
         self._environment.approach(node.id)

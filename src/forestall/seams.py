@@ -12,9 +12,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from forestall.domain.model import Domain
 from forestall.types.demonstration import Demonstration
 from forestall.types.encoder import StateReading
 from forestall.types.episode import EpisodeRecord, Event, SkillOutcome
+from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
@@ -61,8 +63,8 @@ class OracleView(Protocol):
     def states(self, instance: str) -> Mapping[str, str]:
         """True attribute values of one instance, empty if there is no such instance now."""
 
-    def spoiled(self) -> frozenset[str]:
-        """Instances to which something irreversible has happened."""
+    def history(self) -> frozenset[Literal]:
+        """History facts that hold: what has happened and cannot be undone."""
 
     def events(self) -> tuple[Event, ...]:
         """Everything that has happened since reset, in order."""
@@ -245,6 +247,10 @@ class Reasoner(Protocol):
 
 class PlanValidator(Protocol):
     """Executes any plan on an observed graph."""
+
+    @property
+    def domain(self) -> Domain:
+        """Whose skills it executes."""
 
     def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
         """Names the first step that cannot run and why; then checks the goal."""

@@ -58,7 +58,7 @@ def measure(repeat: int, seed: int, progress: Progress) -> dict[str, Any]:
 def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
     loaded = load_task("heat-potato")
     rows = []
-    kitchen = KitchenEnvironment(loaded.task.scene, loaded.vocabulary)
+    kitchen = KitchenEnvironment(loaded.task.scene, loaded.domain)
     try:
         started = time.perf_counter()
         kitchen.reset(seed)
@@ -73,8 +73,8 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
         rows.append(_row("RGB-D-and-ids frame", "ms", times, 300))
         perceiver = GraphPerceiver(
             InstanceSegmenter(),
-            make_state_estimator(STATES, loaded.vocabulary),
-            loaded.vocabulary,
+            make_state_estimator(STATES, loaded.domain),
+            loaded.domain,
         )
         around = kitchen.scan()
         perceiver.perceive(around)
@@ -99,15 +99,15 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
             perceiver.scope(graph, subtask),
             observations[-1],
         )
-        rows.append(_row("repair plan", "ms", _plans(context, loaded.vocabulary, repeat), 50))
+        rows.append(_row("repair plan", "ms", _plans(context, loaded.domain, repeat), 50))
     finally:
         kitchen.close()
     return rows
 
 
-def _plans(context: BoundaryContext, vocabulary: Any, repeat: int) -> list[float]:
+def _plans(context: BoundaryContext, domain: Any, repeat: int) -> list[float]:
     wanted = (Literal("open", ("Microwave-1",), "open"), Literal("held_by", ("Plate-1", "gripper")))
-    replanner = PlannerReplanner(GraphValidator(vocabulary), vocabulary)
+    replanner = PlannerReplanner(GraphValidator(domain), domain)
     times = []
     for _ in range(repeat):
         started = time.perf_counter()

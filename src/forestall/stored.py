@@ -10,9 +10,10 @@ from pathlib import Path
 
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.domain.load import shipped
+from forestall.domain.names import ground_subtask
 from forestall.embeddings.hashed import HashedTextEncoder
 from forestall.errors import UnknownNameError
-from forestall.grounding import ground_subtask
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.parts import RunConfig, make_detector, make_state_estimator
 from forestall.perception.folder import read_observation
@@ -28,7 +29,6 @@ from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Decision, Diagnosis, Verdict
-from forestall.vocabulary import household
 
 
 def judge_stored(
@@ -53,29 +53,29 @@ def judge_stored(
         InputError: a name, the observation or the subtask is not valid.
     """
     loaded = None if task is None else load_task(task)
-    vocabulary = household() if loaded is None else loaded.vocabulary
-    wanted = Subtask.parse(subtask)
+    domain = shipped("household") if loaded is None else loaded.domain
+    wanted = domain.check(Subtask.parse(subtask))
     for name in wanted.args:
-        vocabulary[name]
+        domain[name]
     if states not in known("states") or states == "oracle":
         options = [n for n in known("states") if n != "oracle"]
         raise UnknownNameError("states of a stored observation", states, options)
-    observation, given = read_observation(folder, vocabulary)
+    observation, given = read_observation(folder, domain)
     estimator = (
-        GivenStateEstimator(given)
-        if states == "given"
-        else make_state_estimator(states, vocabulary)
+        GivenStateEstimator(given) if states == "given" else make_state_estimator(states, domain)
     )
-    perceiver = GraphPerceiver(GivenMasks(), estimator, vocabulary)
+    perceiver = GraphPerceiver(GivenMasks(), estimator, domain)
     graph = perceiver.perceive(observation)
-    ground = ground_subtask(wanted, graph, vocabulary, observation.robot_position_world_m, {})
+    ground = ground_subtask(wanted, graph, domain, observation.robot_position_world_m, {})
     scoped = perceiver.scope(graph, ground)
     name = "" if loaded is None else loaded.task.name
     steps = () if loaded is None else loaded.task.plan.subtasks
     done = steps.index(wanted) if wanted in steps else 0
     encoder = HashedTextEncoder()
-    references = tuple(EmbeddingRetriever(demonstrations, encoder).retrieve(ground, name, done))
-    detector = make_detector(RunConfig(name, threshold=threshold), vocabulary)
+    references = tuple(
+        EmbeddingRetriever(demonstrations, encoder, domain).retrieve(ground, name, done)
+    )
+    detector = make_detector(RunConfig(name, threshold=threshold), domain)
     verdict = detector.judge(scoped, observation, references)
     if verdict.decision is Decision.PROCEED:
         return scoped, verdict, None
@@ -91,5 +91,5 @@ def judge_stored(
         observation=observation,
         references=references,
     )
-    reasoner = SymbolicReasoner(mine, violations, vocabulary)
+    reasoner = SymbolicReasoner(mine, violations, domain)
     return scoped, verdict, reasoner.diagnose(context, verdict)

@@ -73,11 +73,11 @@ def train_(
         quiet: no progress on standard error.
     """
     from forestall.cli.progress import bar
+    from forestall.domain.load import shipped
     from forestall.training.recipe import Recipe, train
-    from forestall.vocabulary import household
 
     with bar("training", quiet=quiet) as feed:
-        train(pictures, out, household(), Recipe(seed, steps, batch), feed)
+        train(pictures, out, shipped("household"), Recipe(seed, steps, batch), feed)
     print(out)
     return 0
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from forestall.config import DEFAULT_DOMAIN
+
 if TYPE_CHECKING:
     from forestall.types.graph import SceneGraph
     from forestall.types.verdict import Diagnosis, Verdict
@@ -34,20 +36,28 @@ def read_graph(path: Path) -> SceneGraph:
         raise type(error)(f"{path}: {error}") from error
 
 
-def compare(observed: Path, expected: Path, /, *, as_json: Json = False) -> int:
+def compare(
+    observed: Path, expected: Path, /, *, domain: str = DEFAULT_DOMAIN, as_json: Json = False
+) -> int:
     """Compare two scene graphs: the paper's score, its parts, and the readable difference.
 
     Args:
         observed: scene graph of what is (JSON).
         expected: scene graph of what a demonstration showed (JSON).
+        domain: of both graphs, by name or file.
         as_json: print JSON.
     """
     from forestall.comparison.score import ScoreConfig
     from forestall.comparison.score import compare as compare_graphs
+    from forestall.domain.load import load_domain
     from forestall.embeddings.hashed import HashedTextEncoder
 
     result = compare_graphs(
-        read_graph(observed), read_graph(expected), ScoreConfig(), HashedTextEncoder()
+        read_graph(observed),
+        read_graph(expected),
+        ScoreConfig(),
+        HashedTextEncoder(),
+        load_domain(domain),
     )
     parts = result.parts
     if as_json:

@@ -19,6 +19,7 @@ from forestall.comparison.discrepancy import differences
 from forestall.comparison.looks import QUANTUM, Floats, Ints, Looks, joined, seen
 from forestall.comparison.matching import assign, match, parts, weights
 from forestall.comparison.options import (
+    CountedConfig,
     DegreeScale,
     EmptyRule,
     Feature,
@@ -31,6 +32,7 @@ from forestall.comparison.prepare import (
     prepare,
     tie_values,
 )
+from forestall.domain.model import Domain
 from forestall.seams import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Calibration, Decision, Reference, ScoreParts, Verdict
@@ -72,13 +74,17 @@ class BatchScorer:
     Args:
         config: the options of the score.
         encoder: embeds node labels and subtask texts.
+        domain: which relations, states and categories count, and the words of skills.
         cache_size: how many prepared graphs are remembered.
     """
 
-    def __init__(self, config: ScoreConfig, encoder: TextEncoder, cache_size: int = 8192) -> None:
-        self.config = config
+    def __init__(
+        self, config: ScoreConfig, encoder: TextEncoder, domain: Domain, cache_size: int = 8192
+    ) -> None:
+        self.config = config.of(domain)
+        self._domain = domain
         self._encoder = encoder
-        self._table = LabelTable(config, encoder)
+        self._table = LabelTable(self.config, encoder, domain)
         self._cache_size = cache_size
         self._prepared: OrderedDict[int, tuple[SceneGraph, Prepared]] = OrderedDict()
         self._stacks: OrderedDict[tuple[int, ...], tuple[tuple[SceneGraph, ...], _Stack]] = (
@@ -121,7 +127,11 @@ class BatchScorer:
             nearest=nearest,
             matches=named_pairs(prepared, other, matching.pairs),
             discrepancies=differences(
-                observed, nearest.graph, named_pairs(prepared, other, matching.pairs), self.config
+                observed,
+                nearest.graph,
+                named_pairs(prepared, other, matching.pairs),
+                self.config,
+                self._domain,
             ),
             references=len(references),
         )
@@ -224,7 +234,7 @@ def _stacked(graphs: Sequence[Prepared], predicates: int) -> _Stack:
 
 
 def _partners(
-    observed: Prepared, stack: _Stack, padded: Floats, config: ScoreConfig
+    observed: Prepared, stack: _Stack, padded: Floats, config: CountedConfig
 ) -> tuple[Ints, Floats]:
     """(R, n) index of each observed node's partner or -1, and (R) their summed similarity."""
     size = len(observed.names)
@@ -275,7 +285,7 @@ def _structure(
     partner: Ints,
     matched: Ints,
     union: Ints,
-    config: ScoreConfig,
+    config: CountedConfig,
 ) -> Floats:
     theirs = np.take_along_axis(stack.degree, np.maximum(partner, 0), axis=1)
     ours = observed.degree[None, :]

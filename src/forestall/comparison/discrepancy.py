@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from forestall.comparison.options import ScoreConfig
+from forestall.comparison.options import CountedConfig
+from forestall.domain.model import Domain
+from forestall.domain.truth import truth
 from forestall.types.facts import GRIPPER, Literal, Truth
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.verdict import Change, Discrepancy
@@ -36,7 +38,8 @@ def differences(
     observed: SceneGraph,
     expected: SceneGraph,
     matches: Sequence[tuple[str, str]],
-    config: ScoreConfig,
+    config: CountedConfig,
+    domain: Domain,
 ) -> tuple[Discrepancy, ...]:
     """What keeps the graphs apart; what concerns the subtask's arguments comes first.
 
@@ -45,6 +48,7 @@ def differences(
         expected: the graph of a demonstration.
         matches: (observed id, expected id).
         config: which relations, states and categories count.
+        domain: what the relations are.
     """
     changed = _changed_pairs(observed, expected, matches, config)
     pairs = [*matches, *changed]
@@ -55,8 +59,8 @@ def differences(
     found = [d for o, e in pairs for d in _states(observed, expected, o, e, config)]
     found += _extra_objects(observed, expected, pairing)
     found += _missing_objects(observed, expected, pairing)
-    found += _extra_relations(observed, expected, pairing, config)
-    found += _missing_relations(observed, expected, pairing, config)
+    found += _extra_relations(observed, expected, pairing, config, domain)
+    found += _missing_relations(observed, expected, pairing, config, domain)
     arguments = () if observed.subtask is None else observed.subtask.args
 
     def key(d: Discrepancy) -> tuple[bool, int, str, str]:
@@ -70,7 +74,7 @@ def _changed_pairs(
     observed: SceneGraph,
     expected: SceneGraph,
     matches: Sequence[tuple[str, str]],
-    config: ScoreConfig,
+    config: CountedConfig,
 ) -> list[tuple[str, str]]:
     """Unmatched nodes of one category are the same thing in another state; same ids first."""
     merged = config.supports if config.generic_supports and config.merge_supports else ()
@@ -100,7 +104,7 @@ def _node(graph: SceneGraph, node_id: str) -> ObjectNode:
 
 
 def _states(
-    observed: SceneGraph, expected: SceneGraph, o: str, e: str, config: ScoreConfig
+    observed: SceneGraph, expected: SceneGraph, o: str, e: str, config: CountedConfig
 ) -> list[Discrepancy]:
     wanted = dict(_node(expected, e).states)
     return [
@@ -167,7 +171,7 @@ def _key(graph: SceneGraph, node_id: str, pairing: _Pairing) -> str:
     return "*" if _node(graph, node_id).category in pairing.supports else node_id
 
 
-def _links(graph: SceneGraph, pairing: _Pairing, config: ScoreConfig) -> list[Relation]:
+def _links(graph: SceneGraph, pairing: _Pairing, config: CountedConfig) -> list[Relation]:
     return [
         r
         for r in graph.relations
@@ -177,7 +181,11 @@ def _links(graph: SceneGraph, pairing: _Pairing, config: ScoreConfig) -> list[Re
 
 
 def _extra_relations(
-    observed: SceneGraph, expected: SceneGraph, pairing: _Pairing, config: ScoreConfig
+    observed: SceneGraph,
+    expected: SceneGraph,
+    pairing: _Pairing,
+    config: CountedConfig,
+    domain: Domain,
 ) -> list[Discrepancy]:
     wanted = {
         (_key(expected, r.subject, pairing), r.predicate, _key(expected, r.object, pairing))
@@ -189,32 +197,36 @@ def _extra_relations(
         target = _place(observed, r.object, pairing.expected_of, pairing)
         if (subject, r.predicate, target) in wanted:
             continue
-        there = _what_was_there(expected, r, target)
+        there = _what_was_there(expected, r, target, domain)
         found.append(
             Discrepancy(Change.EXTRA_RELATION, r.subject, there, str(r), f"{_sentence(r)}; {there}")
         )
     return found
 
 
-def _what_was_there(expected: SceneGraph, relation: Relation, target: str) -> str:
+def _what_was_there(expected: SceneGraph, relation: Relation, target: str, domain: Domain) -> str:
     """What the demonstration says about the place that a relation names."""
     if target in ("", "*"):
         return "the demonstration does not have it there"
-    if relation.predicate == "inside" and target in expected.hidden:
+    if relation.predicate in domain.containing and target in expected.hidden:
         return "what was there in the demonstration could not be seen"
     here = sorted(
         r.subject
         for r in expected.relations
         if r.object == target and r.predicate == relation.predicate
     )
-    if relation.predicate == "blocking":
+    if relation.predicate == domain.roles.blocking:
         blocked = "nothing blocks it"
         return f"in the demonstration {', '.join(here) + ' blocks it' if here else blocked}"
     return f"the demonstration shows {', '.join(here) or 'nothing'} there"
 
 
 def _missing_relations(
-    observed: SceneGraph, expected: SceneGraph, pairing: _Pairing, config: ScoreConfig
+    observed: SceneGraph,
+    expected: SceneGraph,
+    pairing: _Pairing,
+    config: CountedConfig,
+    domain: Domain,
 ) -> list[Discrepancy]:
     present = {
         (_key(observed, r.subject, pairing), r.predicate, _key(observed, r.object, pairing))
@@ -231,24 +243,25 @@ def _missing_relations(
             r.predicate,
             target if target not in ("", "*") else r.object,
         )
-        text, known = _what_is_here(observed, here)
+        text, known = _what_is_here(observed, here, domain)
         found.append(Discrepancy(Change.MISSING_RELATION, here.subject, str(here), known, text))
     return found
 
 
-def _what_is_here(observed: SceneGraph, expected: Relation) -> tuple[str, str]:
+def _what_is_here(observed: SceneGraph, expected: Relation, domain: Domain) -> tuple[str, str]:
     literal = Literal(expected.predicate, (expected.subject, expected.object))
     if observed.get(expected.subject) is None:
         return f"in the demonstration {_sentence(expected)}", "not seen"
-    if observed.truth(literal) is Truth.UNOBSERVED:
+    if truth(observed, literal, domain) is Truth.UNOBSERVED:
         return (
             f"whether {_sentence(expected)} could not be seen; the demonstration has it so",
             "unobserved",
         )
+    telling = (*domain.containing, domain.roles.holding)
     places = [
         str(r)
         for r in observed.relations
-        if r.subject == expected.subject and r.predicate in ("inside", "on_top_of", "held_by")
+        if r.subject == expected.subject and r.predicate in telling
     ]
     now = f" ({', '.join(places)})" if places else ""
     return (

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from enum import Enum
 
+from forestall.domain.formula import literals
+from forestall.domain.model import Domain, Skill
+from forestall.domain.truth import truth
 from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-from forestall.vocabulary import Category, Vocabulary
-
-_NEEDED = ("broken", "open", "toggled")
-"""Attributes that decide whether a skill can run; the others only matter to a task's outcome."""
-
-_MECHANICAL = ("open", "toggled")
-_VESSELS = ("dish", "vessel")
 
 
 class Kind(Enum):
@@ -28,7 +24,7 @@ class Kind(Enum):
     CONTEXT = "context"  # things that are no argument of the subtask
 
 
-def lift(graph: SceneGraph, subtask: Subtask, vocabulary: Vocabulary) -> frozenset[Literal]:
+def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Literal]:
     """Every literal of this version that is true of a subtask's arguments in a graph.
 
     - states of the arguments: dirty(?object)=clean, open(?target)=open, ... (before driving
@@ -41,70 +37,92 @@ def lift(graph: SceneGraph, subtask: Subtask, vocabulary: Vocabulary) -> frozens
 
     An argument that is a category name and no node of the graph has no true literal.
     """
-    roles = subtask.roles()
-    moving = subtask.skill == "navigate_to_obj"
-    candidates = {Literal("hand_empty", ())}
+    roles, known = domain.bound(subtask), domain.roles
+    skill = domain.skill(subtask.skill)
+    candidates = {Literal(known.hand_empty, ())} if known.hand_empty else set()
     for variable, name in roles.items():
         node = graph.get(name)
-        category = vocabulary.find(name if node is None else node.category)
+        category = domain.find(name if node is None else node.category)
         if node is None or category is None:
             continue
         candidates |= {
             Literal(attribute, (variable,), value)
             for attribute, value in node.states
             if value is not None
-            and _is_observable(attribute, vocabulary)
-            and not (moving and attribute in _MECHANICAL)
+            and _is_observable(attribute, domain)
+            and not (skill.drives and domain.attributes[attribute].mechanical)
         }
-        if _is_vacatable(category):
-            candidates.add(Literal("vacant", (variable,)))
-        if category.pickupable:
-            candidates.add(Literal("accessible", (variable,)))
-            for value in ("true", "false"):
-                candidates.add(Literal("held_by", (variable, GRIPPER), value))
-            if variable == "?object":
-                candidates.add(Literal("unblocked", (variable,)))
-        candidates |= _contents(graph, node.id, variable, roles, category)
+        if known.vacant and known.vacatable in category.tags:
+            candidates.add(Literal(known.vacant, (variable,)))
+        if known.movable in category.tags:
+            candidates |= _about_movable(variable, skill, domain)
+        if not domain.is_open_support(category.name) and domain.offers(category.name):
+            candidates |= _contents(graph, node.id, variable, roles, domain)
     if len(roles) == 2:
-        for predicate in ("inside", "on_top_of"):
+        first, second = roles
+        for predicate in domain.containing:
             for value in ("true", "false"):
-                candidates.add(Literal(predicate, ("?object", "?target"), value))
+                candidates.add(Literal(predicate, (first, second), value))
     held = graph.holding
-    if held is not None and held not in roles.values():
+    if held is not None and known.holding and held not in roles.values():
         node = graph.get(held)
         category_name = category_of(held) if node is None else node.category
-        candidates.add(Literal("held_by", (category_name, GRIPPER)))
-    return frozenset(c for c in candidates if evaluate(c, graph, subtask) is Truth.TRUE)
+        candidates.add(Literal(known.holding, (category_name, GRIPPER)))
+    return frozenset(c for c in candidates if evaluate(c, graph, subtask, domain) is Truth.TRUE)
 
 
-def kind_of(literal: Literal) -> Kind:
+def _about_movable(variable: str, skill: Skill, domain: Domain) -> set[Literal]:
+    """What can matter about a thing that a hand can take."""
+    roles, found = domain.roles, set()
+    if roles.accessible:
+        found.add(Literal(roles.accessible, (variable,)))
+    if roles.holding:
+        for value in ("true", "false"):
+            found.add(Literal(roles.holding, (variable, GRIPPER), value))
+    if roles.unblocked and _asks_for_way(variable, skill, domain):
+        found.add(Literal(roles.unblocked, (variable,)))
+    return found
+
+
+def _asks_for_way(variable: str, skill: Skill, domain: Domain) -> bool:
+    """Whether a skill needs nothing to stand before a thing."""
+    way = (domain.roles.unblocked, domain.roles.blocking)
+    return any(
+        x.predicate in way and variable in x.args
+        for need in skill.needs
+        for x, _ in literals(need.formula)
+    )
+
+
+def kind_of(literal: Literal, domain: Domain) -> Kind:
     """How far a lifted literal carries over."""
-    if literal.is_state and literal.predicate not in _NEEDED:
+    attribute = domain.attributes.get(literal.predicate)
+    if literal.is_state and (attribute is None or attribute.material):
         return Kind.MATERIAL
     names = [a for a in literal.args if a != GRIPPER]
-    if literal.predicate == "hand_empty" or any(not a.startswith("?") for a in names):
+    if not names or any(not a.startswith("?") for a in names):
         return Kind.CONTEXT
     return Kind.SKILL
 
 
-def evaluate(literal: Literal, graph: SceneGraph, subtask: Subtask) -> Truth:
+def evaluate(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain) -> Truth:
     """The truth of a lifted literal in a graph, its variables bound to the subtask's arguments.
 
     A literal about an argument that is no node of the graph is unobserved. What the gripper holds
     is always known, and so is that it stands nowhere else.
     """
-    ground = literal.bind(subtask.roles())
+    ground = literal.bind(domain.bound(subtask))
     for raw, name in zip(literal.args, ground.args, strict=True):
         if raw.startswith("?") and graph.get(name) is None:
             return Truth.UNOBSERVED
-    if ground.predicate == "held_by":
+    if ground.predicate == domain.roles.holding:
         return _held(ground, graph)
     first = literal.args[0] if literal.args else ""
-    if ground.predicate in ("inside", "on_top_of") and not first.startswith("?"):
+    if ground.predicate in domain.containing and not first.startswith("?"):
         return _contains(ground, graph)
-    if ground.predicate in ("inside", "on_top_of") and graph.holding == ground.args[0]:
+    if ground.predicate in domain.containing and graph.holding == ground.args[0]:
         return Truth.TRUE if ground.value == "false" else Truth.FALSE
-    return graph.truth(ground)
+    return truth(graph, ground, domain)
 
 
 def _held(ground: Literal, graph: SceneGraph) -> Truth:
@@ -125,38 +143,18 @@ def _contains(ground: Literal, graph: SceneGraph) -> Truth:
 
 
 def _contents(
-    graph: SceneGraph, node_id: str, variable: str, roles: dict[str, str], category: Category
+    graph: SceneGraph, node_id: str, variable: str, roles: dict[str, str], domain: Domain
 ) -> set[Literal]:
-    if category.receptacle is None or _is_surface(category):
-        return set()
     return {
         Literal(r.predicate, (category_of(r.subject), variable))
         for r in graph.relations
         if r.object == node_id
-        and r.predicate in ("inside", "on_top_of")
+        and r.predicate in domain.containing
         and r.subject not in roles.values()
     }
 
 
-def _is_observable(attribute: str, vocabulary: Vocabulary) -> bool:
-    """Whether a camera can tell; demonstrations may know attributes that this vocabulary lacks."""
-    known = vocabulary.attributes.get(attribute)
+def _is_observable(attribute: str, domain: Domain) -> bool:
+    """Whether a camera can tell; demonstrations may know attributes that this domain lacks."""
+    known = domain.attributes.get(attribute)
     return known is not None and known.camera
-
-
-def _is_vacatable(category: Category) -> bool:
-    """Whether it can matter that nothing is in or on it: not for counters, fridges and sinks."""
-    receptacle = category.receptacle
-    if receptacle is None:
-        return False
-    return receptacle.capacity is not None or category.shape.get("kind") in _VESSELS
-
-
-def _is_surface(category: Category) -> bool:
-    receptacle = category.receptacle
-    return (
-        category.fixture
-        and receptacle is not None
-        and receptacle.relation == "on_top_of"
-        and receptacle.capacity is None
-    )

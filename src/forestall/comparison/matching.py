@@ -12,10 +12,10 @@ from scipy.optimize import linear_sum_assignment
 
 from forestall.comparison.looks import QUANTUM, Floats, Ints, seen
 from forestall.comparison.options import (
+    CountedConfig,
     DegreeScale,
     EmptyRule,
     Feature,
-    ScoreConfig,
     StructureCount,
 )
 from forestall.comparison.prepare import Prepared, ties
@@ -53,7 +53,7 @@ def assign(weight: Floats, observed: Prepared, expected: Prepared) -> tuple[Ints
     return rows.astype(np.int64), columns.astype(np.int64)
 
 
-def match(observed: Prepared, expected: Prepared, table: Floats, config: ScoreConfig) -> Matching:
+def match(observed: Prepared, expected: Prepared, table: Floats, config: CountedConfig) -> Matching:
     """Maximum total similarity, ties decided by surroundings; pairs below the floor are dropped."""
     similarity = table[np.ix_(observed.labels, expected.labels)]
     if config.feature is Feature.IMAGE:
@@ -71,7 +71,7 @@ def match(observed: Prepared, expected: Prepared, table: Floats, config: ScoreCo
 
 
 def parts(
-    observed: Prepared, expected: Prepared, matching: Matching, config: ScoreConfig
+    observed: Prepared, expected: Prepared, matching: Matching, config: CountedConfig
 ) -> ScoreParts:
     """Eqs. 1-3 for one matching."""
     node, union = _node(observed, expected, matching, config)
@@ -87,12 +87,12 @@ def parts(
     return ScoreParts(total / len(known) if known else 1.0, *values)
 
 
-def _zero_by_zero(config: ScoreConfig) -> float | None:
+def _zero_by_zero(config: CountedConfig) -> float | None:
     return 1.0 if config.empty is EmptyRule.ONE else None
 
 
 def _node(
-    observed: Prepared, expected: Prepared, matching: Matching, config: ScoreConfig
+    observed: Prepared, expected: Prepared, matching: Matching, config: CountedConfig
 ) -> tuple[float | None, int]:
     """S_node (Eq. 1) and |V_exp ∪ V_obs|."""
     matched = len(matching.pairs) + (matching.subtask is not None)
@@ -104,7 +104,7 @@ def _node(
 
 
 def _edge(
-    observed: Prepared, expected: Prepared, matching: Matching, config: ScoreConfig
+    observed: Prepared, expected: Prepared, matching: Matching, config: CountedConfig
 ) -> float | None:
     """S_edge (Eq. 2): the same predicate between matched nodes."""
     partner = dict(matching.pairs)
@@ -117,7 +117,7 @@ def _edge(
 
 
 def _structure(
-    observed: Prepared, expected: Prepared, matching: Matching, config: ScoreConfig, union: int
+    observed: Prepared, expected: Prepared, matching: Matching, config: CountedConfig, union: int
 ) -> float | None:
     """S_struc (Eq. 3); the pair of subtask nodes has no edges and differs by nothing."""
     if union == 0:

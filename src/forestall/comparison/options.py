@@ -6,14 +6,11 @@ docs/decisions/0003-score-options.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 
+from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.types.facts import RELATIONS
-
-SUPPORTS = ("CounterTop", "DiningTable", "Floor", "Shelf", "TVStand")
-"""Categories on which things merely stand."""
 
 
 class Feature(Enum):
@@ -66,18 +63,18 @@ class ScoreConfig:
         subtask_floor: the same for the two subtask nodes.
         state_changes_match: whether a node may match one of the same category whose known states
             differ; unobserved states agree with anything.
-        ignored_attributes: states that do not count. A camera cannot see temperature.
+        ignored_attributes: states that do not count; None: those that no camera sees.
         subtask_node: whether the subtask node counts; it matches only the other subtask node.
         degree_scale: D.
         structure_count: N.
-        predicates: relations that count.
+        predicates: relations that count; None: those that the domain scores.
         empty: what 0/0 is worth.
         generic_supports: categories in `supports` compare as one category "support".
         merge_supports: and all supports of a graph are one node, so that it does not matter which
             thing stands on which of them. Without effect unless `generic_supports`.
-        supports: the categories meant by the two options above.
+        supports: the categories meant by the two options above; None: the domain's supports.
         instance_categories: nodes of these categories match only when their numbers are equal or
-            both are the same argument of their subtasks.
+            both are the same argument of their subtasks; None: the domain's numbered ones.
         use_node: ablation: whether S_node counts.
         use_edge: ablation: whether S_edge counts.
         use_structure: ablation: whether S_struc counts.
@@ -92,16 +89,16 @@ class ScoreConfig:
     image_floor: float = 0.55
     subtask_floor: float = 0.6
     state_changes_match: bool = False
-    ignored_attributes: tuple[str, ...] = ("temperature",)
+    ignored_attributes: tuple[str, ...] | None = None
     subtask_node: bool = True
     degree_scale: DegreeScale = DegreeScale.LARGEST
     structure_count: StructureCount = StructureCount.MATCHED
-    predicates: tuple[str, ...] = ("blocking", "held_by", "inside", "on_top_of")
+    predicates: tuple[str, ...] | None = None
     empty: EmptyRule = EmptyRule.ONE
     generic_supports: bool = True
     merge_supports: bool = True
-    supports: tuple[str, ...] = SUPPORTS
-    instance_categories: tuple[str, ...] = ("StoveBurner", "StoveKnob")
+    supports: tuple[str, ...] | None = None
+    instance_categories: tuple[str, ...] | None = None
     use_node: bool = True
     use_edge: bool = True
     use_structure: bool = True
@@ -114,6 +111,32 @@ class ScoreConfig:
                 raise InputError(f"floor {floor} is not above 0 and at most 1")
         if not 0 <= self.state_weight < 1:
             raise InputError(f"state_weight {self.state_weight} is not at least 0 and below 1")
-        for predicate in self.predicates:
-            if predicate not in RELATIONS:
-                raise UnknownNameError("relation", predicate, RELATIONS)
+
+    def of(self, domain: Domain) -> CountedConfig:
+        """The options with what the domain says in the place of None.
+
+        Raises:
+            UnknownNameError: a relation that the domain does not have.
+        """
+        for predicate in self.predicates or ():
+            if predicate not in domain.relations:
+                raise UnknownNameError("relation", predicate, domain.relations)
+        unseen = tuple(sorted(a.name for a in domain.attributes.values() if not a.camera))
+        given = {f.name: getattr(self, f.name) for f in fields(ScoreConfig)}
+        own = {
+            "ignored_attributes": unseen,
+            "predicates": domain.scored,
+            "supports": domain.tagged(domain.roles.support),
+            "instance_categories": domain.tagged(domain.roles.numbered),
+        }
+        return CountedConfig(**{**given, **{k: v for k, v in own.items() if given[k] is None}})
+
+
+@dataclass(frozen=True, slots=True)
+class CountedConfig(ScoreConfig):
+    """Options in which nothing is left to the domain any more."""
+
+    ignored_attributes: tuple[str, ...] = ()
+    predicates: tuple[str, ...] = ()
+    supports: tuple[str, ...] = ()
+    instance_categories: tuple[str, ...] = ()

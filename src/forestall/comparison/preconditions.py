@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from forestall.comparison.lifting import Kind, evaluate, kind_of, lift
+from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.types.facts import Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Precondition, Reference, Violation
-from forestall.vocabulary import Vocabulary
 
 __all__ = ["MiningConfig", "lift", "mine", "violations"]
-
-_FAMILY = {"put_on": "put", "put_in": "put"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +39,7 @@ class MiningConfig:
 
 def mine(
     references: Sequence[Reference],
-    vocabulary: Vocabulary,
+    domain: Domain,
     config: MiningConfig | None = None,
     *,
     subtask: Subtask | None = None,
@@ -51,14 +49,14 @@ def mine(
 
     Where fewer than `minimum_support` demonstrations have the same kinds of arguments, all
     references of the skill are used, but only for literals that follow from the skill itself.
-    Literals of the material (dirty, filled, cooked, sliced) are mined from the task at hand alone:
-    that a bowl was clean before a salad says nothing about moving a bowl out of the way. So are
+    Literals of the material are mined from the task at hand alone:
+    that a thing was clean before one task says nothing about moving it out of the way. So are
     literals about what is no argument of the subtask; their support must come from one step.
     What was not observed in a demonstration counts neither for nor against a literal.
 
     Args:
         references: as retrieved, best first.
-        vocabulary: categories and how they hold things.
+        domain: categories and how they hold things.
         config: how much evidence is needed.
         subtask: the subtask at hand; that of the best reference by default.
         task: name of the task at hand; that of the best reference by default.
@@ -72,22 +70,22 @@ def mine(
         return ()
     subtask = subtask or references[0].subtask
     task = task if task is not None else references[0].task
-    skill = [r for r in references if _family(r.subtask) == _family(subtask)]
-    kinds = _kinds(subtask, vocabulary)
-    same = [r for r in skill if _kinds(r.subtask, vocabulary) == kinds]
+    skill = [r for r in references if domain.family(r.subtask) == domain.family(subtask)]
+    kinds = _kinds(subtask, domain)
+    same = [r for r in skill if _kinds(r.subtask, domain) == kinds]
     alike = len(_runs(same)) >= config.minimum_support
     group = same if alike else skill
     step = next((r.index for r in group if r.task == task), None)
     candidates: set[Literal] = set()
     for r in group:
-        candidates |= lift(r.graph, r.subtask, vocabulary)
+        candidates |= lift(r.graph, r.subtask, domain)
     found = []
     for literal in sorted(candidates):
-        kind = kind_of(literal)
+        kind = kind_of(literal, domain)
         if not alike and kind is not Kind.SKILL:
             continue
         asked = group if kind is Kind.SKILL else [r for r in group if r.task == task]
-        truths = [evaluate(literal, r.graph, r.subtask) for r in asked]
+        truths = [evaluate(literal, r.graph, r.subtask, domain) for r in asked]
         if Truth.FALSE in truths:
             continue
         true = [r for t, r in zip(truths, asked, strict=True) if t is Truth.TRUE]
@@ -100,7 +98,7 @@ def mine(
 
 
 def violations(
-    preconditions: Sequence[Precondition], graph: SceneGraph, subtask: Subtask
+    preconditions: Sequence[Precondition], graph: SceneGraph, subtask: Subtask, domain: Domain
 ) -> tuple[Violation, ...]:
     """Preconditions that are false or unobserved in a graph, false ones first.
 
@@ -109,11 +107,11 @@ def violations(
     """
     found = []
     for p in preconditions:
-        if _FAMILY.get(p.skill, p.skill) != _family(subtask):
+        if domain.family(Subtask(p.skill, ())) != domain.family(subtask):
             continue
-        truth = evaluate(p.literal, graph, subtask)
+        truth = evaluate(p.literal, graph, subtask, domain)
         if truth is not Truth.TRUE:
-            found.append(Violation(p, p.literal.bind(subtask.roles()), truth))
+            found.append(Violation(p, p.literal.bind(domain.bound(subtask)), truth))
     return tuple(
         sorted(
             found,
@@ -126,9 +124,5 @@ def _runs(references: Sequence[Reference]) -> set[str]:
     return {r.demonstration for r in references}
 
 
-def _family(subtask: Subtask) -> str:
-    return _FAMILY.get(subtask.skill, subtask.skill)
-
-
-def _kinds(subtask: Subtask, vocabulary: Vocabulary) -> tuple[str, ...]:
-    return tuple(category_of(vocabulary.canonical(a)) for a in subtask.args)
+def _kinds(subtask: Subtask, domain: Domain) -> tuple[str, ...]:
+    return tuple(category_of(domain.canonical(a)) for a in subtask.args)

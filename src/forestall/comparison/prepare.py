@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.comparison.looks import NEVER, QUANTUM, Floats, Ints, Looks, looks_of
-from forestall.comparison.options import Feature, ScoreConfig
+from forestall.comparison.options import CountedConfig, Feature
+from forestall.domain.model import Domain
 from forestall.seams import TextEncoder
 from forestall.types.facts import GRIPPER, category_of, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph
@@ -34,9 +35,9 @@ def without_numbers(text: str) -> str:
     return _NUMBER.sub("", text)
 
 
-def subtask_text(graph: SceneGraph) -> str | None:
+def subtask_text(graph: SceneGraph, domain: Domain) -> str | None:
     """What the subtask node says, without instance numbers."""
-    return None if graph.subtask is None else without_numbers(graph.subtask.words())
+    return None if graph.subtask is None else without_numbers(domain.words(graph.subtask))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +74,8 @@ class Prepared:
 class LabelTable:
     """Distinct labels and their similarities; grows as labels are met."""
 
-    def __init__(self, config: ScoreConfig, encoder: TextEncoder) -> None:
+    def __init__(self, config: CountedConfig, encoder: TextEncoder, domain: Domain) -> None:
+        self.domain = domain
         self._config = config
         self._apart = NEVER if config.feature is Feature.IMAGE else 0.0
         self._encoder = encoder
@@ -158,7 +160,7 @@ def _label_text(category: str, states: list[str]) -> str:
     return f"{category} ({', '.join(states)})" if states else category
 
 
-def prepare(graph: SceneGraph, config: ScoreConfig, table: LabelTable) -> Prepared:
+def prepare(graph: SceneGraph, config: CountedConfig, table: LabelTable) -> Prepared:
     """The arrays of one graph."""
     roles = {} if graph.subtask is None else {a: i + 1 for i, a in enumerate(graph.subtask.args)}
     groups: dict[str, list[ObjectNode]] = {}
@@ -192,7 +194,7 @@ def prepare(graph: SceneGraph, config: ScoreConfig, table: LabelTable) -> Prepar
     rows = [table.row(label) for label in labels]
     features = _features([groups[k][0] for k in keys], config)
     seen = hashlib.blake2b(repr(features).encode()).hexdigest() if any(features) else ""
-    text = subtask_text(graph) if config.subtask_node else None
+    text = subtask_text(graph, table.domain) if config.subtask_node else None
     subtask = -1 if text is None else table.row(text)
     role_codes = [max(roles.get(n.id, 0) for n in groups[k]) for k in keys]
     numbers = [zlib.crc32(groups[k][0].id.encode()) for k in keys]
@@ -213,11 +215,11 @@ def prepare(graph: SceneGraph, config: ScoreConfig, table: LabelTable) -> Prepar
     )
 
 
-def _is_support(node: ObjectNode, config: ScoreConfig) -> bool:
+def _is_support(node: ObjectNode, config: CountedConfig) -> bool:
     return node.category in config.supports
 
 
-def _features(nodes: Sequence[ObjectNode], config: ScoreConfig) -> list[bytes | None]:
+def _features(nodes: Sequence[ObjectNode], config: CountedConfig) -> list[bytes | None]:
     """Image features that count: not those of supports that compare as one category."""
     if config.feature is not Feature.IMAGE:
         return []
@@ -225,7 +227,7 @@ def _features(nodes: Sequence[ObjectNode], config: ScoreConfig) -> list[bytes | 
     return [n.feature if apart or not _is_support(n, config) else None for n in nodes]
 
 
-def _label(node: ObjectNode, config: ScoreConfig, roles: dict[str, int]) -> Label:
+def _label(node: ObjectNode, config: CountedConfig, roles: dict[str, int]) -> Label:
     category = node.category
     if node.id == GRIPPER:
         category = GRIPPER

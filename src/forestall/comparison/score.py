@@ -20,6 +20,7 @@ from forestall.comparison.options import (
     StructureCount,
 )
 from forestall.comparison.prepare import LabelTable, prepare
+from forestall.domain.model import Domain
 from forestall.seams import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Discrepancy, ScoreParts
@@ -49,13 +50,20 @@ class Comparison:
 
 
 def compare(
-    observed: SceneGraph, expected: SceneGraph, config: ScoreConfig, encoder: TextEncoder
+    observed: SceneGraph,
+    expected: SceneGraph,
+    config: ScoreConfig,
+    encoder: TextEncoder,
+    domain: Domain,
 ) -> Comparison:
     """Score an observed graph against an expected one and say how they differ."""
-    table = LabelTable(config, encoder)
+    config = config.of(domain)
+    table = LabelTable(config, encoder, domain)
     a, b = prepare(observed, config, table), prepare(expected, config, table)
     matching = match(a, b, table.similarities(), config)
     matches = named_pairs(a, b, matching.pairs)
     return Comparison(
-        parts(a, b, matching, config), matches, differences(observed, expected, matches, config)
+        parts(a, b, matching, config),
+        matches,
+        differences(observed, expected, matches, config, domain),
     )

@@ -14,13 +14,13 @@ import numpy.typing as npt
 
 from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import Feature, ScoreConfig
+from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.seams import TextEncoder
 from forestall.types.facts import GRIPPER
 from forestall.types.feature import quantised
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
-from forestall.vocabulary import Vocabulary, household
 
 
 class DirectionEncoder:
@@ -40,41 +40,41 @@ class DirectionEncoder:
 def random_graph(
     n_nodes: int,
     rng: np.random.Generator,
-    vocabulary: Vocabulary | None = None,
+    domain: Domain,
     feature_size: int = 0,
 ) -> SceneGraph:
     """A graph of `n_nodes` nodes (gripper included) with one relation for nearly every object.
 
-    Categories and states are drawn from the vocabulary; a state is unobserved one time in ten. With
+    Categories and states are drawn from the domain; a state is unobserved one time in ten. With
     a `feature_size` objects have image features of that many numbers: a direction of the category
     and at most as much noise; one in ten has none.
     """
-    vocabulary = vocabulary or household()
-    names = sorted(vocabulary.categories)
+    names = sorted(domain.categories)
     nodes = [ObjectNode(GRIPPER, GRIPPER)]
     seen: dict[str, int] = {}
     for category in rng.choice(names, size=n_nodes - 1).tolist():
         seen[category] = seen.get(category, 0) + 1
         states = tuple(
-            (a, None if rng.random() < 0.1 else str(rng.choice(vocabulary.values(a))))
-            for a in vocabulary[category].attributes
+            (a, None if rng.random() < 0.1 else str(rng.choice(domain.values(a))))
+            for a in domain[category].attributes
         )
         look = random_feature(category, rng, feature_size) if feature_size else None
         nodes.append(ObjectNode(f"{category}-{seen[category]}", category, states, feature=look))
-    places = [n for n in nodes[1:] if vocabulary[n.category].receptacle is not None]
+    places = [n for n in nodes[1:] if domain.offers(n.category) is not None]
+    roles, skill = domain.roles, next(s for s in domain.skills.values() if len(s.parameters) == 2)
     relations = []
     for i, node in enumerate(nodes[1:]):
         if i == 0:
-            relations.append(Relation(node.id, "held_by", GRIPPER))
-        elif places and vocabulary[node.category].pickupable:
+            relations.append(Relation(node.id, roles.holding or "", GRIPPER))
+        elif places and domain.is_a(node.category, roles.movable):
             place = places[int(rng.integers(len(places)))]
-            receptacle = vocabulary[place.category].receptacle
-            if place.id != node.id and receptacle is not None:
-                relations.append(Relation(node.id, receptacle.relation, place.id))
+            relation = domain.offers(place.category)
+            if place.id != node.id and relation is not None:
+                relations.append(Relation(node.id, relation, place.id))
         other = nodes[1 + int(rng.integers(n_nodes - 1))]
         if rng.random() < 0.1 and other.id != node.id:
-            relations.append(Relation(node.id, "blocking", other.id))
-    subtask = Subtask("put_in", (nodes[1].id, nodes[2].id)) if n_nodes > 2 else None
+            relations.append(Relation(node.id, roles.blocking or "", other.id))
+    subtask = Subtask(skill.name, (nodes[1].id, nodes[2].id)) if n_nodes > 2 else None
     return SceneGraph(tuple(nodes), tuple(relations), subtask)
 
 
@@ -89,6 +89,7 @@ def score_times(
     n_references: int,
     n_nodes: int,
     seed: int,
+    domain: Domain,
     repeat: int = 10,
     encoder: TextEncoder | None = None,
     feature: Feature = Feature.PARTS,
@@ -102,6 +103,7 @@ def score_times(
         n_references: how many reference graphs.
         n_nodes: nodes of each graph.
         seed: of the graphs.
+        domain: what the graphs speak of.
         repeat: how many new graphs are compared.
         encoder: embeds labels; random directions by default.
         feature: what nodes are compared by.
@@ -114,12 +116,14 @@ def score_times(
         raise InputError("timing needs at least one reference and two nodes")
     rng = np.random.default_rng(seed)
     size = feature_size if feature is Feature.IMAGE else 0
-    references = [random_graph(n_nodes, rng, feature_size=size) for _ in range(n_references)]
-    scorer = BatchScorer(ScoreConfig(feature=feature), encoder or DirectionEncoder())
-    scorer.scores(random_graph(n_nodes, rng, feature_size=size), references)
+    references = [
+        random_graph(n_nodes, rng, domain, feature_size=size) for _ in range(n_references)
+    ]
+    scorer = BatchScorer(ScoreConfig(feature=feature), encoder or DirectionEncoder(), domain)
+    scorer.scores(random_graph(n_nodes, rng, domain, feature_size=size), references)
     times = []
     for _ in range(repeat):
-        observed = random_graph(n_nodes, rng, feature_size=size)
+        observed = random_graph(n_nodes, rng, domain, feature_size=size)
         started = time.perf_counter()
         scorer.scores(observed, references)
         times.append(time.perf_counter() - started)

@@ -6,11 +6,11 @@ Called like every detector at a boundary; reads which things are supports from t
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from forestall.comparison.options import SUPPORTS
 from forestall.detection.baseline import judged
 from forestall.detection.scene_graph import DetectorConfig, is_located
+from forestall.domain.model import Domain
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
@@ -33,24 +33,30 @@ class ObjectCountDetector:
 
     name = "objects"
 
-    def __init__(self, config: DetectorConfig | None = None) -> None:
+    def __init__(self, domain: Domain, config: DetectorConfig | None = None) -> None:
+        self._supports = domain.tagged(domain.roles.support)
         self._config = config or DetectorConfig()
 
     def judge(
         self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
     ) -> Verdict:
         """Compare the counts of the scoped graph with those of every reference."""
-        mine = counts(observed)
-        pairs = [(overlap(mine, counts(r.graph)), r) for r in references]
+        mine = counts(observed, self._supports)
+        pairs = [(overlap(mine, counts(r.graph, self._supports)), r) for r in references]
         scores = [(round(score, 6), r) for score, r in pairs if score is not None]
         nothing = "neither the scene nor a reference has a located object"
         return judged(self.name, self._config, scores, len(references), nothing)
 
 
-def counts(graph: SceneGraph) -> Counter[str]:
-    """How many located objects of each category a graph has; the gripper is none."""
+def counts(graph: SceneGraph, supports: Iterable[str]) -> Counter[str]:
+    """How many located objects of each category a graph has; the gripper is none.
+
+    Args:
+        graph: scoped.
+        supports: categories on which things merely stand; all of them count as one.
+    """
     found = Counter(n.category for n in graph.nodes if n.id != GRIPPER and is_located(n))
-    if any([found.pop(c, 0) for c in SUPPORTS]):  # all of them are taken out
+    if any([found.pop(c, 0) for c in supports]):  # all of them are taken out
         found["support"] = 1
     return found
 

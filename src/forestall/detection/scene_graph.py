@@ -107,13 +107,13 @@ def unseen_arguments(
         return ()
     same = [r for r in references if r.subtask.skill == subtask.skill] or list(references)
     unseen = []
-    for role, name in subtask.roles().items():
+    for role, name in enumerate(subtask.args):
         if any(is_located(observed.get(i)) for i in observed.matches(name)):
             continue
         shown = [
-            is_located(r.graph.get(argument))
+            is_located(r.graph.get(r.subtask.args[role]))
             for r in same
-            if (argument := r.subtask.roles().get(role)) is not None
+            if role < len(r.subtask.args)
         ]
         if shown and sum(shown) >= share * len(shown):
             unseen.append(name)
@@ -123,12 +123,12 @@ def unseen_arguments(
 def unseen_by(reference: Reference, observed: SceneGraph) -> tuple[str, ...]:
     """Arguments that are in sight here and were not known in a reference of the same skill."""
     subtask, other = observed.subtask, reference.subtask
-    if subtask is None or subtask.roles().keys() != other.roles().keys():
+    if subtask is None or len(subtask.args) != len(other.args):
         return ()
     return tuple(
         name
-        for role, name in subtask.roles().items()
-        if observed.matches(name) and not reference.graph.matches(other.roles()[role])
+        for name, there in zip(subtask.args, other.args, strict=True)
+        if observed.matches(name) and not reference.graph.matches(there)
     )
 
 

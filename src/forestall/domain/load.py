@@ -35,7 +35,11 @@ _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
     "skills", "processes", "safety",
 )  # fmt: skip
-_CATEGORY = ("tags", "attributes", "defaults", "aliases", "words", "synonyms", "world")
+_ATTRIBUTE = (
+    "values", "phrases", "by_category", "camera", "lasting", "mined", "bins", "unit", "words",
+    "material", "mechanical", "in_hand", "fine", "obscures", "says",
+)  # fmt: skip
+_CATEGORY = ("tags", "attributes", "defaults", "aliases", "words", "synonyms", "size_m", "world")
 
 
 @cache
@@ -221,8 +225,7 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
     """One attribute; of one that exists only phrases can be given."""
     label = f"attribute {name}"
     table = as_table(label, table)
-    _known(label, table, ("values", "phrases", "by_category", "camera", "lasting", "mined", "bins",
-                          "unit", "words"))  # fmt: skip
+    _known(label, table, _ATTRIBUTE)
     base = domain.attributes.get(name)
     if base is None and (name in domain.predicates or name in domain.skills or name in BUILT_IN):
         kind = domain.predicates[name].kind.value if name in domain.predicates else "skill"
@@ -265,6 +268,12 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
         bins=bins,
         unit=table.get("unit", start.unit),
         words=table.get("words", start.words),
+        material=table.get("material", start.material),
+        mechanical=table.get("mechanical", start.mechanical),
+        in_hand=table.get("in_hand", start.in_hand),
+        fine=table.get("fine", start.fine),
+        obscures=table.get("obscures", start.obscures),
+        says={**start.says, **as_table(f"{label}: says", table.get("says", {}))},
         lasting=table.get("lasting", start.lasting if base else bool(domain.categories)),
     )
 
@@ -277,6 +286,9 @@ def _category(name: str, table: Any, domain: Domain, base: Category | None) -> C
     table = as_table(label, table)
     statics, inverse = _statics(domain), _inverse(domain)
     numbers = {k: v for k, v in table.items() if isinstance(v, int) and not isinstance(v, bool)}
+    for key, value in table.items():
+        if isinstance(value, bool) and key in domain.tags:
+            raise InputError(f'{label}: {key} is a tag: write tags = ["{key}"]')
     _known(label, table, (*_CATEGORY, *statics, *inverse, *numbers))
     tags = _names(label, "tags", table)
     for tag in tags:
@@ -307,6 +319,7 @@ def _category(name: str, table: Any, domain: Domain, base: Category | None) -> C
         tuple(dict.fromkeys((*old.aliases, *_names(label, "aliases", table)))),
         table.get("words", old.words),
         tuple(dict.fromkeys((*old.synonyms, *synonyms))),
+        tuple(float(x) for x in table.get("size_m", old.size_m)),
         {**old.extra, **extra},
     )
 

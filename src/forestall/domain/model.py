@@ -43,7 +43,15 @@ class Predicate:
         camera: whether a picture can show it.
         contains: whether it says where a thing is: the first argument in, on or at the second.
         group: relations of one group exclude each other for one first argument.
-        scored: whether the comparison counts it.
+        scored: whether the comparison counts it, and a graph for one subtask keeps it.
+        geometry: how perception finds it: "containment", "support", "" for neither.
+        offered_by: tag of the things that take others in this relation.
+        material: whether an attribute is of the matter and decides over a task's outcome only, and
+            not over whether skills can run.
+        mechanical: whether an attribute makes no difference to driving to its thing.
+        in_hand: whether an attribute may change while its thing is held.
+        fine: whether an attribute looks too small to be told on a distant thing.
+        obscures: the value beside which the other attributes of a thing cannot be told.
         lasting: whether what is made of a thing takes the attribute over.
         paired: which things of two categories a static predicate holds between: "" all,
             "same number", or "same number or first" (the first where no number is the same).
@@ -51,6 +59,7 @@ class Predicate:
         definition: of a derived predicate.
         words: how a sentence says that it holds, with {0}, {1} for its arguments.
         opposite: how a sentence says that it does not.
+        says: value → how a sentence says it of a thing, where the value alone would not do.
         phrases: value → texts that fit a picture of it.
         by_category: category → value → texts that replace the general ones.
         bins: lower bounds of the values, where they stand for ranges of a number.
@@ -64,13 +73,21 @@ class Predicate:
     camera: bool = True
     contains: bool = False
     group: str | None = None
-    scored: bool = True
+    scored: bool = False
+    geometry: str = ""
+    offered_by: str = ""
+    material: bool = True
+    mechanical: bool = False
+    in_hand: bool = False
+    fine: bool = False
+    obscures: str = ""
     lasting: bool = False
     paired: str = ""
     mined: bool = True
     definition: Formula | None = None
     words: str = ""
     opposite: str = ""
+    says: Mapping[str, str] = field(default_factory=dict, hash=False)
     phrases: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
     by_category: Mapping[str, Mapping[str, tuple[str, ...]]] = field(
         default_factory=dict, hash=False
@@ -107,6 +124,7 @@ class Category:
         aliases: further names of the same category.
         words: how a person calls it.
         synonyms: other everyday names.
+        size_m: usual width, depth and height, for what shows only in part; () where they vary.
         extra: tables for worlds, which no other part reads.
     """
 
@@ -118,6 +136,7 @@ class Category:
     aliases: tuple[str, ...] = ()
     words: str = ""
     synonyms: tuple[str, ...] = ()
+    size_m: tuple[float, ...] = ()
     extra: Mapping[str, object] = field(default_factory=dict, hash=False)
 
     @property
@@ -304,6 +323,9 @@ class Roles:
         rest: tags of supports, in order, on which things are put out of the way.
         avoid: tags of places where nothing is put unless somebody asks for it.
         encloses: tag of what can be shut around its contents.
+        crowded: tag of what holds many things by nature.
+        vacatable: tag of what it can matter for that nothing is in or on it.
+        numbered: tag of things that only their numbers tell apart.
     """
 
     holding: str | None = None
@@ -319,6 +341,9 @@ class Roles:
     support: str = "support"
     ground: str = "ground"
     encloses: str = "encloses"
+    crowded: str = "crowded"
+    vacatable: str = "vacatable"
+    numbered: str = "numbered"
     rest: tuple[str, ...] = ()
     avoid: tuple[str, ...] = ()
 
@@ -451,6 +476,11 @@ class Domain:
         used = {x.predicate for f in formulas for x, _ in literals(f)}
         return frozenset(used & (self.relations.keys() | self.histories.keys()))
 
+    def say(self, attribute: str, value: str) -> str:
+        """How a sentence says that a thing has a value: "filled with water"."""
+        known = self.attributes.get(attribute)
+        return value if known is None else known.says.get(value, value)
+
     def values(self, attribute: str) -> tuple[str, ...]:
         """Every value of an attribute, the default first.
 
@@ -482,6 +512,64 @@ class Domain:
         """Whether a static predicate holds between the categories of some names."""
         wanted = tuple(category_of(self.canonical(n)) for n in names)
         return wanted in self.statics.get(predicate, frozenset())
+
+    def offers(self, name: str) -> str | None:
+        """The relation in which a thing (name or category) takes others; None: it takes none."""
+        kinds = self.kinds(category_of(self.canonical(name)))
+        for relation in self.containing:
+            if self.predicates[relation].offered_by in kinds:
+                return relation
+        return None
+
+    def accepts(self, place: str, thing: str) -> bool:
+        """Whether a place (name or category) takes a thing."""
+        role = self.roles.accepts
+        if role is None:
+            return self.offers(place) is not None
+        return self.static(role, place, thing)
+
+    def is_open_support(self, name: str) -> bool:
+        """Whether any instance of a category will do as a place."""
+        return self.is_a(name, self.roles.support)
+
+    def paired(self, name: str) -> frozenset[str]:
+        """Categories whose thing of the same number belongs to a thing: the tap of a basin."""
+        own = category_of(self.canonical(name))
+        return frozenset(
+            first
+            for p in self.predicates.values()
+            if p.kind is PredicateKind.STATIC and p.paired
+            for first, second in self.statics.get(p.name, ())
+            if second == own
+        )
+
+    def becomes(self, name: str) -> frozenset[str]:
+        """Categories of what a skill can make of a thing."""
+        own = category_of(self.canonical(name))
+        return frozenset(
+            second
+            for skill in self.skills.values()
+            for make in skill.makes
+            for first, second in self.statics.get(make.by, ())
+            if first == own
+        )
+
+    @cached_property
+    def scored(self) -> tuple[str, ...]:
+        """Relations that say what a thing is doing, not merely where it is, sorted."""
+        return tuple(sorted(p.name for p in self.relations.values() if p.scored))
+
+    def text(self, step: Subtask) -> str:
+        """What is compared of a subtask: its family's words and its arguments."""
+        family = self.family(step)
+        if family == step.skill:
+            return self.words(step)
+        return " ".join((family.replace("_", " "), *step.args))
+
+    def family(self, step: Subtask) -> str:
+        """The family of a subtask's skill."""
+        skill = self.skills.get(step.skill)
+        return step.skill if skill is None else skill.family
 
     def encloses(self, name: str) -> bool:
         """Whether contents cannot be seen or reached while it is shut."""

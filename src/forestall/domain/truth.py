@@ -6,7 +6,7 @@ Called by perception's scope, mining, diagnosis, detection and the monitor; call
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from forestall.domain.evaluate import FALSE, TRUE, UNKNOWN, UNOBSERVED, evaluate, literal_truth
 from forestall.domain.formula import Formula
@@ -157,9 +157,18 @@ def truth(graph: SceneGraph, literal: Literal, domain: Domain) -> Truth:
     return view(graph, domain).truth(literal)
 
 
+def is_shut(domain: Domain, category: str, states: Mapping[str, str | None]) -> Truth:
+    """Whether a thing with these states keeps its contents from hand and eye."""
+    shut = domain.roles.shut
+    if shut is None or not domain.is_a(category, domain.roles.encloses):
+        return Truth.FALSE
+    alone = SceneGraph((ObjectNode("it", category, tuple(states.items())),))
+    return GraphView(alone, domain).truth(Literal(shut, ("it",)))
+
+
 def formula_truth(graph: SceneGraph, formula: Formula, domain: Domain) -> Truth:
     """The three-valued truth of a closed formula on a graph."""
     return _TRUTH[evaluate(formula, view(graph, domain), {})]
 
 
-__all__ = ["GraphView", "formula_truth", "truth", "view"]
+__all__ = ["GraphView", "formula_truth", "is_shut", "truth", "view"]

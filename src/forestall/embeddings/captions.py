@@ -7,11 +7,11 @@ that. Unlike a caption it never errs about what perception found.
 
 from __future__ import annotations
 
-from forestall.attributes import with_articles
+from forestall.domain.model import Domain
+from forestall.domain.phrases import with_articles
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import Observation
-from forestall.vocabulary import Vocabulary
 
 
 class ListingCaptioner:
@@ -22,13 +22,13 @@ class ListingCaptioner:
     shows; a thing without any other state is named: "A knife."
 
     Args:
-        vocabulary: how things and their states are called.
+        domain: how things and their states are called.
     """
 
     name = "listing (stand-in)"
 
-    def __init__(self, vocabulary: Vocabulary) -> None:
-        self._vocabulary = vocabulary
+    def __init__(self, domain: Domain) -> None:
+        self._domain = domain
 
     def caption(self, observation: Observation, scoped: SceneGraph) -> str:
         """Sentences about the visible nodes of the scoped graph; "" where there are none."""
@@ -38,11 +38,11 @@ class ListingCaptioner:
 
     def _phrases(self, node: ObjectNode) -> tuple[str, ...]:
         """One for each state that a picture can show; the thing's name where there is none."""
-        category = self._vocabulary.find(node.category)
+        category = self._domain.find(node.category)
         if category is None:
             return (with_articles(f"a {node.category}"),)
         found = [
-            self._vocabulary.phrases(node.category, attribute, value)
+            self._domain.phrases(node.category, attribute, value)
             for attribute, value in node.states
             if value is not None and attribute in category.attributes
         ]

@@ -20,7 +20,6 @@ from typing import Any
 
 from forestall.errors import ForestallError, InputError
 from forestall.types.demonstration import Demonstration, DemonstrationStep, View
-from forestall.types.facts import RELATIONS
 from forestall.types.feature import whole_numbers
 from forestall.types.graph import GRAPH_FORMAT, Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import Vec3
@@ -137,9 +136,6 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
             )
         nodes = [_node(n) for n in things["nodes"]]
         relations = [Relation(s, p, o) for s, p, o in things["relations"]]
-        known = set(RELATIONS)
-        if any(r.predicate not in known for r in relations):
-            raise DamageError(f"demonstration {name} has a relation that is not known")
         subtasks: dict[str, Subtask] = {}
         views = [_view(v) for v in things.get("views", [None] * len(encoded.steps))]
         final = things.get("final")

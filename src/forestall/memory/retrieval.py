@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forestall.domain.model import Domain
 from forestall.errors import InputError, MemoryFileError
 from forestall.seams import DemonstrationStore, TextEncoder
 from forestall.types.demonstration import Demonstration, DemonstrationStep
@@ -18,7 +19,6 @@ from forestall.types.plan import Subtask
 from forestall.types.verdict import Reference
 
 _NUMBER = re.compile(r"-\d+\b")
-_FAMILY = {"put_on": "put", "put_in": "put"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +28,13 @@ class RetrievalConfig:
     Args:
         k: how many references at most.
         floor: smallest similarity of the subtask texts. With hashed words the ten tasks' subtasks
-            score 1.0 for the same words, 0.87 at most for other things handled alike ("pick up
-            LettuceSliced" and "pick up Lettuce"), 0.55 to 0.75 for the same skill on another
-            object. A scene without the object at hand cannot come near the detector's threshold,
-            so such steps are no references by default.
+            score 1.0 for the same words, 0.87 at most for other things handled alike, 0.55 to
+            0.75 for the same skill on another object. A scene without the object at hand cannot
+            come near the detector's threshold, so such steps are no references by default.
         per_demonstration: how many steps of one demonstration at most. Two, so that a subtask that
             occurs twice in a task is not taken for its other occurrence without a contradiction.
         same_task_bonus: added to a similarity for ranking when the step is of the same task.
-        same_skill: whether only steps of the same skill count (put_on and put_in are one).
+        same_skill: whether only steps of the same skill count (those of one family are one).
     """
 
     k: int = 8
@@ -56,14 +55,13 @@ class _Entry:
     step: DemonstrationStep
 
 
-def subtask_words(subtask: Subtask) -> str:
+def subtask_words(subtask: Subtask, domain: Domain) -> str:
     """The text that is compared: the subtask's words without instance numbers.
 
-    All numbers are stripped: Mug-1 is a mug in every kitchen, and what was learnt in front of
-    StoveBurner-1 serves in front of StoveBurner-4. "Put in" and "put on" are both "put".
+    All numbers are stripped: a mug is a mug in every kitchen, and what was learnt in front of one
+    burner serves in front of another. Skills of one family have one verb.
     """
-    words = f"{_family(subtask).removesuffix('_obj').replace('_', ' ')} {' '.join(subtask.args)}"
-    return _NUMBER.sub("", words)
+    return _NUMBER.sub("", domain.text(subtask))
 
 
 class EmbeddingRetriever:
@@ -72,6 +70,7 @@ class EmbeddingRetriever:
     Args:
         demonstrations: a store, or the demonstrations themselves.
         encoder: embeds subtask texts.
+        domain: the words and families of skills.
         config: how many references, and how similar.
 
     Raises:
@@ -82,10 +81,12 @@ class EmbeddingRetriever:
         self,
         demonstrations: DemonstrationStore | Sequence[Demonstration],
         encoder: TextEncoder,
+        domain: Domain,
         config: RetrievalConfig | None = None,
     ) -> None:
         loaded = demonstrations if isinstance(demonstrations, Sequence) else demonstrations.all()
         self._encoder = encoder
+        self._domain = domain
         self._config = config or RetrievalConfig()
         self._entries = [
             _Entry(d, i, s)
@@ -96,10 +97,12 @@ class EmbeddingRetriever:
             raise MemoryFileError(
                 "the memory holds no demonstrations: record some with 'forestall demos record'"
             )
-        self._matrix = encoder.encode([subtask_words(e.step.subtask) for e in self._entries])
+        self._matrix = encoder.encode(
+            [subtask_words(e.step.subtask, domain) for e in self._entries]
+        )
         self._tasks = np.array([e.demonstration.task for e in self._entries])
         self._indices = np.array([e.step.index for e in self._entries])
-        self._skills = np.array([_family(e.step.subtask) for e in self._entries])
+        self._skills = np.array([domain.family(e.step.subtask) for e in self._entries])
 
     def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
         """References for a subtask, best first; none above the floor: an empty list.
@@ -108,11 +111,11 @@ class EmbeddingRetriever:
         in its demonstration is closest to `done` comes first, then demonstration and position.
         """
         config = self._config
-        similarity = self._matrix @ self._encoder.encode([subtask_words(subtask)])[0]
+        similarity = self._matrix @ self._encoder.encode([subtask_words(subtask, self._domain)])[0]
         similarity = np.minimum(np.round(similarity.astype(np.float64), 6), 1.0)
         allowed = similarity >= config.floor
         if config.same_skill:
-            allowed &= self._skills == _family(subtask)
+            allowed &= self._skills == self._domain.family(subtask)
         rank = similarity + config.same_task_bonus * (self._tasks == task)
         gap = np.abs(self._indices - done)
         found: list[Reference] = []
@@ -142,7 +145,3 @@ def _reference(entry: _Entry, similarity: float) -> Reference:
         view=entry.step.view,
         after=demonstration.after(entry.position),
     )
-
-
-def _family(subtask: Subtask) -> str:
-    return _FAMILY.get(subtask.skill, subtask.skill)

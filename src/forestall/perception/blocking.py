@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack
-from forestall.perception.support import Parent
+from forestall.perception.support import CONTAINMENT, Parent
 from forestall.perception.unproject import Labels, Points
 from forestall.types.graph import Relation
 from forestall.types.observation import Depth, Vec3
-from forestall.vocabulary import Vocabulary
 
 
 def cuts(
@@ -53,7 +53,7 @@ def blocking(
     parents: Mapping[str, Parent],
     eye_world_m: Vec3,
     cut_share: Mapping[tuple[str, str], float],
-    vocabulary: Vocabulary,
+    domain: Domain,
     config: PerceptionConfig,
 ) -> list[Relation]:
     """Every "B blocking A" between things with the same parent.
@@ -63,9 +63,11 @@ def blocking(
         parents: what each thing rests in or on.
         eye_world_m: where the robot looks from.
         cut_share: (nearer, farther) → share of the farther one's outline that is cut off.
-        vocabulary: how tall things are of which only a part shows.
+        domain: how tall things are of which only a part shows.
         config: thresholds.
     """
+    if domain.roles.blocking is None:
+        return []
     index = {t.id: i for i, t in enumerate(stack.things)}
     beside: dict[Parent, list[str]] = {}
     for name in sorted(parents):
@@ -76,18 +78,18 @@ def blocking(
     for (predicate, support), names in beside.items():
         if len(names) < 2:
             continue
-        if predicate == "inside":
+        if domain.predicates[predicate].geometry == CONTAINMENT:
             axes = _opening(stack, index[support], [index[n] for n in names], eye, config)
         else:
             axes = _open_edge(stack, index[support], eye, config)
-        extents = {n: _extent(stack, index[n], axes, vocabulary) for n in names}
+        extents = {n: _extent(stack, index[n], axes, domain) for n in names}
         for target in names:
             if _from_above(stack, index[support], index[target], config):
                 continue
             for other in names:
                 cut = cut_share.get((other, target), 0.0) >= config.occlusion_share
                 if other != target and _in_the_way(extents[target], extents[other], cut, config):
-                    found.append(Relation(other, "blocking", target))
+                    found.append(Relation(other, domain.roles.blocking, target))
     return found
 
 
@@ -141,14 +143,14 @@ def _opening(
     return _axes(np.array(min(options)[2]))
 
 
-def _extent(stack: Stack, i: int, axes: Axes, vocabulary: Vocabulary) -> tuple[float, ...]:
+def _extent(stack: Stack, i: int, axes: Axes, domain: Domain) -> tuple[float, ...]:
     """Extent of a thing towards the hand, across, and upwards."""
     local = stack.samples[i][:, :2] @ axes.T
     low, high = local.min(axis=0), local.max(axis=0)
     foot, top = float(stack.low_m[i, 2]), float(stack.high_m[i, 2])
-    category = vocabulary.find(stack.things[i].category)
-    size = None if category is None else category.shape.get("size_m")
-    tall = top if size is None else max(top, foot + float(size[2]))
+    category = domain.find(stack.things[i].category)
+    size = None if category is None else category.size_m
+    tall = top if not size else max(top, foot + float(size[2]))
     return (float(low[0]), float(high[0]), float(low[1]), float(high[1]), foot, tall)
 
 

@@ -72,8 +72,6 @@ class PerceptionConfig:
             count as observed.
         glimpse_share: views of a thing with a smaller share of its largest view's pixels, in one
             observation, say nothing about its states.
-        changes_in_hand: attributes that may change while a thing is held (it is poured from,
-            opened, turned on); a contradiction in another one is taken for the look of fingers.
         same_place_m: distance over which an untracked detection is the same object as before.
     """
 
@@ -119,12 +117,7 @@ class PerceptionConfig:
     expected_pixels: float = 4.0
     interior_share: float = 0.1
     glimpse_share: float = 0.5
-    changes_in_hand: tuple[str, ...] = ("filled", "open", "toggled")
     same_place_m: float = 0.3
-
-
-SEMANTIC = ("blocking", "held_by", "inside", "on_top_of")
-"""Relations that say what a thing is doing, not merely where it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +126,8 @@ class ScopeConfig:
 
     Args:
         whole: keep every node and relation (the subtask node is still set).
-        predicates: relations that are kept.
-        crowded: receptacles with many contents, of which only arguments are kept.
         fellows: keep what stands beside an argument in the same small receptacle.
     """
 
     whole: bool = False
-    predicates: tuple[str, ...] = SEMANTIC
-    crowded: tuple[str, ...] = ("Cabinet", "Drawer", "Fridge", "GarbageCan", "Sink")
     fellows: bool = True

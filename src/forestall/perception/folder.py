@@ -16,11 +16,12 @@ import numpy as np
 from PIL import Image
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, UnknownNameError
 from forestall.perception.folder_files import MaskFile, read_depth, read_rgb, single_mask
 from forestall.types.facts import category_of, is_instance
 from forestall.types.observation import Detection, Frame, GripperState, Intrinsics, Observation
-from forestall.vocabulary import Vocabulary, household
 
 OBSERVATION_FILE = "observation.json"
 OBSERVATION_FORMAT = 1
@@ -73,21 +74,21 @@ class _Document(_Strict):
 
 
 def read_observation(
-    path: Path | str, vocabulary: Vocabulary | None = None
+    path: Path | str, domain: Domain | None = None
 ) -> tuple[Observation, Mapping[str, Mapping[str, str]]]:
     """Read a stored observation and the states that were written down with it.
 
     Args:
         path: the folder.
-        vocabulary: which categories and states there are; the household's by default.
+        domain: which categories and states there are; the household's by default.
 
     Raises:
         FileFormatError: a file is missing or cannot be read as what it should be.
-        UnknownNameError: a category, attribute or value that is not in the vocabulary.
+        UnknownNameError: a category, attribute or value that is not in the domain.
         PerceptionError: depth or masks that cannot be used.
     """
     folder = Path(path)
-    words = vocabulary or household()
+    words = domain or shipped("household")
     document = _document(folder)
     frames, states = [], GivenStates()
     for index, data in enumerate(document.frames):
@@ -131,7 +132,7 @@ def _frame(
     data: _Frame,
     index: int,
     alone: bool,
-    vocabulary: Vocabulary,
+    domain: Domain,
     states: GivenStates,
 ) -> Frame:
     rgb = read_rgb(folder / data.rgb)
@@ -143,10 +144,10 @@ def _frame(
     used: set[int | str | None] = set()
     for number, given in enumerate(data.detections):
         where = f"{folder / OBSERVATION_FILE}: frames.{index}.detections.{number}"
-        category = vocabulary[given.category].name
+        category = domain[given.category].name
         instance = given.instance
         if instance is not None:
-            instance = _instance(instance, vocabulary, where)
+            instance = _instance(instance, domain, where)
             if category_of(instance) != category:
                 raise FileFormatError(f"{where}: instance {instance!r} is not a {category}")
         elif alone:
@@ -156,7 +157,7 @@ def _frame(
         if given.states:
             if instance is None:
                 raise FileFormatError(f"{where}: states need an instance, for example {category}-1")
-            states.setdefault(instance, {}).update(_states(given.states, category, vocabulary))
+            states.setdefault(instance, {}).update(_states(given.states, category, domain))
         source = given.id if given.id is not None else given.mask
         if source in used:
             raise FileFormatError(f"{where}: mask {source!r} belongs to another detection already")
@@ -195,10 +196,10 @@ def _mask(
     return mask
 
 
-def _instance(name: str, vocabulary: Vocabulary, where: str) -> str:
-    canonical = vocabulary.canonical(name)
-    if vocabulary.find(canonical) is None:
-        raise UnknownNameError("object category", category_of(name), vocabulary.categories)
+def _instance(name: str, domain: Domain, where: str) -> str:
+    canonical = domain.canonical(name)
+    if domain.find(canonical) is None:
+        raise UnknownNameError("object category", category_of(name), domain.categories)
     if not is_instance(canonical):
         raise FileFormatError(f"{where}: {name!r} needs a number, for example {canonical}-1")
     return canonical
@@ -212,13 +213,13 @@ def _next_name(category: str, done: Sequence[Detection], given: Sequence[_Detect
     return f"{category}-{number}"
 
 
-def _states(given: Mapping[str, str], category: str, vocabulary: Vocabulary) -> dict[str, str]:
-    known = vocabulary[category].attributes
+def _states(given: Mapping[str, str], category: str, domain: Domain) -> dict[str, str]:
+    known = domain[category].attributes
     for attribute, value in given.items():
         if attribute not in known:
             raise UnknownNameError(f"attribute of {category}", attribute, known)
-        if value not in vocabulary.values(attribute):
-            raise UnknownNameError(f"value of {attribute}", value, vocabulary.values(attribute))
+        if value not in domain.values(attribute):
+            raise UnknownNameError(f"value of {attribute}", value, domain.values(attribute))
     return dict(given)
 
 

@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from forestall.domain.model import Domain
+from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack, Thing
@@ -27,10 +29,9 @@ from forestall.perception.tracks import (
     interior_observed,
 )
 from forestall.perception.unproject import Points, robust_box
-from forestall.types.facts import GRIPPER, category_of
+from forestall.types.facts import GRIPPER, Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
-from forestall.vocabulary import Vocabulary
 
 _STILL_M = 0.03
 _MOST_POINTS = 6000
@@ -39,8 +40,9 @@ _MOST_POINTS = 6000
 class SceneMemory:
     """Everything believed about the scene; `integrate` changes it, `graph` states it."""
 
-    def __init__(self, vocabulary: Vocabulary, config: PerceptionConfig) -> None:
-        self._vocabulary = vocabulary
+    def __init__(self, domain: Domain, config: PerceptionConfig) -> None:
+        self._domain = domain
+        self._changing = tuple(a.name for a in domain.attributes.values() if a.in_hand)
         self._config = config
         self.reset()
 
@@ -91,7 +93,7 @@ class SceneMemory:
             track.last_seen_s = time_s
             read = readings(found[name], self._config.glimpse_share)
             if name == self._held:
-                read = in_hand(read, track.states, self._config.changes_in_hand)
+                read = in_hand(read, track.states, self._changing)
             track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
                 track.feature = sighting.feature or track.feature
@@ -132,7 +134,7 @@ class SceneMemory:
     def _hold(self, held: str, seen: set[str]) -> None:
         track = self.tracks.get(held)
         if track is None:
-            track = Track(held, category_of(self._vocabulary.canonical(held)))
+            track = Track(held, category_of(self._domain.canonical(held)))
             self.tracks[held] = track
         track.parent = None
         if held not in seen:
@@ -215,10 +217,9 @@ class SceneMemory:
         fresh = [self.tracks[i] for i in sorted(seen) if self.tracks[i].first_seen_s == time_s]
         for name in sorted(self.tracks):
             track = self.tracks[name]
-            category = self._vocabulary.find(track.category)
-            if category is None or name in seen or name == self._held:
+            if name in seen or name == self._held:
                 continue
-            becomes = {category.slices_into, category.cracks_into} - {None}
+            becomes = self._domain.becomes(track.category)
             pieces = [t for t in fresh if t.category in becomes]
             if not pieces:
                 continue
@@ -245,14 +246,14 @@ class SceneMemory:
         )
         homeless = {n for n, t in self.tracks.items() if t.parent is None and n not in seen}
         subjects = (seen | homeless) - {self._held}
-        found = parents(stack, subjects, self._vocabulary, self._config)
+        found = parents(stack, subjects, self._domain, self._config)
         for name in sorted(subjects):
             track = self.tracks[name]
             track.parent = found.get(name) or self._former_parent(track)
         links = {n: t.parent for n, t in self.tracks.items() if t.parent is not None}
         relations = [Relation(n, predicate, r) for n, (predicate, r) in links.items()]
-        if self._held is not None:
-            relations.append(Relation(self._held, "held_by", GRIPPER))
+        if self._held is not None and self._domain.roles.holding is not None:
+            relations.append(Relation(self._held, self._domain.roles.holding, GRIPPER))
         camera = views[-1].frame.camera_to_world
         skip = {n for n, t in self.tracks.items() if self._is_large_support(t.category)}
         skip |= {self._held} if self._held is not None else set()
@@ -260,7 +261,7 @@ class SceneMemory:
         relations += directions(stack, camera, skip, tied, self._config)
         eye = (float(camera[0, 3]), float(camera[1, 3]), float(camera[2, 3]))
         cut = self._cut_shares(views)
-        relations += blocking(stack, links, eye, cut, self._vocabulary, self._config)
+        relations += blocking(stack, links, eye, cut, self._domain, self._config)
         self._relations = relations
 
     def _former_parent(self, track: Track) -> Parent | None:
@@ -289,10 +290,11 @@ class SceneMemory:
 
     def _mark(self, seen: set[str], fate: Mapping[str, Fates], views: Sequence[View]) -> None:
         for name, track in self.tracks.items():
-            if self._vocabulary.find(track.category) and self._vocabulary.encloses(track.category):
-                if self._closed(track):
+            if self._domain.encloses(track.category):
+                shut = is_shut(self._domain, track.category, track.states)
+                if shut is Truth.TRUE:
                     track.interior_seen = False
-                elif track.states.get("open") == "open" and name in seen:
+                elif shut is Truth.FALSE and name in seen:
                     track.interior_seen |= interior_observed(track, views, self._config)
         for name, track in self.tracks.items():
             codes = fate.get(name)
@@ -313,14 +315,12 @@ class SceneMemory:
         hidden = [
             n
             for n, t in self.tracks.items()
-            if self._vocabulary.find(t.category) is not None
-            and self._vocabulary.encloses(t.category)
-            and not t.interior_seen
+            if self._domain.encloses(t.category) and not t.interior_seen
         ]
         return SceneGraph(tuple(nodes), tuple(self._relations), hidden=tuple(hidden))
 
     def _node(self, track: Track) -> ObjectNode:
-        category = self._vocabulary.find(track.category)
+        category = self._domain.find(track.category)
         attributes: tuple[str, ...] = () if category is None else category.attributes
         states = {a: track.states.get(a) for a in attributes}
         located = track.points_world_m is not None
@@ -339,21 +339,13 @@ class SceneMemory:
     # --- small questions ------------------------------------------------------------------------
 
     def _is_fixture(self, category: str) -> bool:
-        found = self._vocabulary.find(category)
-        return found is not None and found.fixture
+        return self._domain.is_a(category, self._domain.roles.fixture)
 
     def _is_large_support(self, category: str) -> bool:
-        found = self._vocabulary.find(category)
-        if found is None or found.receptacle is None or not found.fixture:
-            return False
-        return found.receptacle.relation == "on_top_of" and found.receptacle.capacity is None
+        return self._domain.is_open_support(category)
 
     def _closed(self, track: Track) -> bool:
-        return (
-            track.states.get("open") == "closed"
-            and self._vocabulary.find(track.category) is not None
-            and self._vocabulary.encloses(track.category)
-        )
+        return is_shut(self._domain, track.category, track.states) is Truth.TRUE
 
     def _shut_in(self, track: Track) -> bool:
         """Whether something closed is around it, at any depth."""

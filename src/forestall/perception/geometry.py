@@ -29,7 +29,7 @@ class Thing:
 
     Args:
         id: node id.
-        category: of the vocabulary.
+        category: of the domain.
         points_world_m: (n, 3), n ≥ 1.
         low_m: (3,) lower corner of its box.
         high_m: (3,) upper corner.

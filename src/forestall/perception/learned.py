@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.seams import ImageTextEncoder
 from forestall.types.observation import Detection, Frame
-from forestall.vocabulary import Vocabulary
 
 Floats = npt.NDArray[np.float64]
 
@@ -36,26 +36,26 @@ class LearnedStateEstimator:
 
     Args:
         encoder: embeds crops and phrases, and says how its cosines are to be read.
-        vocabulary: which attributes a category has, and the phrases for their values.
+        domain: which attributes a category has, and the phrases for their values.
 
     Raises:
         InputError: a phrase that the encoder cannot read.
     """
 
-    def __init__(self, encoder: ImageTextEncoder, vocabulary: Vocabulary) -> None:
+    def __init__(self, encoder: ImageTextEncoder, domain: Domain) -> None:
         self._encoder = encoder
-        self._vocabulary = vocabulary
+        self._domain = domain
         self._questions: dict[str, tuple[Question, ...]] = {}
         self.name = f"learned states ({encoder.name})"
 
     def estimate(
         self, frame: Frame, detections: Sequence[Detection]
     ) -> Sequence[Mapping[str, str | None]]:
-        """See the Protocol; a category that the vocabulary lacks has no states."""
+        """See the Protocol; a category that the domain lacks has no states."""
         asked = [
             (i, self.questions(d.category))
             for i, d in enumerate(detections)
-            if self._vocabulary.find(d.category) is not None
+            if self._domain.find(d.category) is not None
         ]
         asked = [(i, questions) for i, questions in asked if questions]
         least = self._encoder.reading.least_area
@@ -74,13 +74,13 @@ class LearnedStateEstimator:
         Raises:
             InputError: a phrase that the encoder cannot read.
         """
-        name = self._vocabulary[category].name
+        name = self._domain[category].name
         found = self._questions.get(name)
         if found is None:
             found = tuple(
-                Question(a, self._vocabulary.values(a), self._vectors(name, a))
-                for a in self._vocabulary[name].attributes
-                if self._vocabulary.attributes[a].camera
+                Question(a, self._domain.values(a), self._vectors(name, a))
+                for a in self._domain[name].attributes
+                if self._domain.attributes[a].camera
             )
             self._questions[name] = found
         return found
@@ -104,14 +104,15 @@ class LearnedStateEstimator:
             best = int(confidence.argmax())
             sure = confidence[best] >= self._encoder.reading.least_confidence(question.attribute)
             found[question.attribute] = question.values[best] if sure else None
-        if found.get("broken") == "broken":  # shards are neither clean nor full
-            return {a: "broken" if a == "broken" else None for a in found}
+        for attribute, value in found.items():
+            if value is not None and self._domain.attributes[attribute].obscures == value:
+                return {a: value if a == attribute else None for a in found}
         return found
 
     def _vectors(self, category: str, attribute: str) -> npt.NDArray[np.float32]:
         rows = []
-        for value in self._vocabulary.values(attribute):
-            phrases = self._vocabulary.phrases(category, attribute, value)
+        for value in self._domain.values(attribute):
+            phrases = self._domain.phrases(category, attribute, value)
             try:
                 mean = self._encoder.encode(phrases).mean(axis=0)
             except InputError as error:

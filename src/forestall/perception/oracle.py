@@ -6,15 +6,10 @@ could tell, so that it can be replaced by a learned estimator without changing w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
+from forestall.domain.model import Domain
 from forestall.types.observation import Detection, Frame
-
-NOT_VISIBLE = ("temperature",)
-"""Attributes of the shipped vocabulary that no camera sees."""
-
-FINE = ("broken", "cooked", "dirty", "filled")
-"""Attributes whose look is too small to be told on a distant object."""
 
 
 class OracleStateEstimator:
@@ -22,8 +17,8 @@ class OracleStateEstimator:
 
     Args:
         states: instance name → its true attribute values.
+        domain: which attributes a camera sees, and which of them look too small from afar.
         fine_pixels: mask size under which the fine attributes are not told.
-        not_visible: attributes that are never told.
     """
 
     name = "oracle states"
@@ -31,12 +26,13 @@ class OracleStateEstimator:
     def __init__(
         self,
         states: Callable[[str], Mapping[str, str]],
+        domain: Domain,
         *,
         fine_pixels: int = 120,
-        not_visible: Collection[str] = NOT_VISIBLE,
     ) -> None:
         self._states = states
-        self._not_visible = frozenset(not_visible)
+        self._told = {a.name for a in domain.attributes.values() if a.camera}
+        self._fine = {a.name for a in domain.attributes.values() if a.fine}
         self._fine_pixels = fine_pixels
 
     def estimate(
@@ -51,7 +47,7 @@ class OracleStateEstimator:
         true = self._states(detection.instance)
         small = int(detection.mask.sum()) < self._fine_pixels
         return {
-            a: None if small and a in FINE else value
+            a: None if small and a in self._fine else value
             for a, value in true.items()
-            if a not in self._not_visible
+            if a in self._told
         }

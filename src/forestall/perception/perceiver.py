@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.fuse import SceneMemory
@@ -21,7 +22,6 @@ from forestall.types.feature import quantised
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
-from forestall.vocabulary import Vocabulary
 
 
 class GraphPerceiver:
@@ -30,7 +30,7 @@ class GraphPerceiver:
     Args:
         segmenter: where masks come from.
         state_estimator: where states come from.
-        vocabulary: categories, their attributes and what goes where.
+        domain: categories, their attributes and what goes where.
         config: thresholds.
         scope_config: what a subtask's graph keeps.
         image_encoder: gives every located thing the feature of its largest crop (f(v) of Eq. 1 as
@@ -41,7 +41,7 @@ class GraphPerceiver:
         self,
         segmenter: Segmenter,
         state_estimator: StateEstimator,
-        vocabulary: Vocabulary,
+        domain: Domain,
         config: PerceptionConfig | None = None,
         scope_config: ScopeConfig | None = None,
         *,
@@ -49,11 +49,11 @@ class GraphPerceiver:
     ) -> None:
         self._segmenter = segmenter
         self._estimator = state_estimator
-        self._vocabulary = vocabulary
+        self._domain = domain
         self._config = config or PerceptionConfig()
         self._scope = scope_config or ScopeConfig()
         self._image_encoder = image_encoder
-        self._memory = SceneMemory(vocabulary, self._config)
+        self._memory = SceneMemory(domain, self._config)
 
     def reset(self) -> None:
         """Forget everything."""
@@ -81,7 +81,7 @@ class GraphPerceiver:
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
         """The part of a graph that concerns a (grounded) subtask, with its subtask node."""
-        return scope(graph, subtask, self._vocabulary, self._scope)
+        return scope(graph, subtask, self._domain, self._scope)
 
     def describe(self) -> Mapping[str, str]:
         """Which segmenter, state estimator and, if any, image encoder are used.
@@ -137,7 +137,6 @@ class GraphPerceiver:
         return tuple(features)
 
     def _voxel_m(self, detection: Detection) -> float:
-        category = self._vocabulary.find(detection.category)
-        if category is not None and category.fixture:
+        if self._domain.is_a(detection.category, self._domain.roles.fixture):
             return self._config.fixture_voxel_m
         return self._config.voxel_m

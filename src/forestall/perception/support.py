@@ -1,6 +1,6 @@
 """What each thing is inside or on top of: one parent, the smallest that holds it.
 
-The vocabulary says which of the two relations a receptacle offers and what it accepts; points say
+The domain says which of the two relations a receptacle offers and what it accepts; points say
 whether it holds. Support is a surface found right below and around an object (which hides what is
 under it) or, where others hide that too, the top of something it stands over. Containment is walls
 found around it. Both use only what is visible of the receptacle.
@@ -13,62 +13,64 @@ from collections.abc import Collection
 
 import numpy as np
 
+from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import DIRECTIONS, Stack
 from forestall.perception.unproject import Points
-from forestall.vocabulary import Vocabulary
+
+CONTAINMENT = "containment"
+"""Geometry of a predicate that walls around a thing show; any other one shows by support."""
 
 Parent = tuple[str, str]
 """(predicate, id of the receptacle)."""
 
 
 def parents(
-    stack: Stack, subjects: Collection[str], vocabulary: Vocabulary, config: PerceptionConfig
+    stack: Stack, subjects: Collection[str], domain: Domain, config: PerceptionConfig
 ) -> dict[str, Parent]:
     """For each subject that rests in or on something: the relation and the receptacle.
 
     Args:
         stack: every located thing.
         subjects: ids whose parent is asked for.
-        vocabulary: which receptacle takes what, and how.
+        domain: which receptacle takes what, and how.
         config: thresholds.
     """
     found: dict[str, Parent] = {}
     for a, thing in enumerate(stack.things):
-        category = vocabulary.find(thing.category)
-        if thing.id not in subjects or (category is not None and category.fixture):
+        fixed = domain.is_a(thing.category, domain.roles.fixture)
+        if thing.id not in subjects or fixed:
             continue
-        parent = _parent(stack, a, vocabulary, config)
+        parent = _parent(stack, a, domain, config)
         if parent is not None:
             found[thing.id] = parent
     return found
 
 
-def _parent(
-    stack: Stack, a: int, vocabulary: Vocabulary, config: PerceptionConfig
-) -> Parent | None:
+def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> Parent | None:
     near = _touching(stack, a, config)
     candidates = [
-        r for r in near if _takes(vocabulary, stack.things[r].category, stack.things[a].category)
+        r for r in near if _takes(domain, stack.things[r].category, stack.things[a].category)
     ]
     if not candidates:
         return None
     own = stack.samples[a]
     over = stack.over(own, candidates, config.footprint_slack_m)
     share = dict(zip(candidates, over.mean(axis=0).tolist(), strict=True))
-    bottom = _bottom_m(stack, a, vocabulary)
+    bottom = _bottom_m(stack, a, domain)
     area = np.prod(stack.high_m[:, :2] - stack.low_m[:, :2], axis=1)
     holding: list[tuple[float, str, int]] = []
     touching: list[tuple[float, str, int]] = []
     for r in candidates:
-        predicate = _relation(vocabulary, stack.things[r].category)
-        if predicate == "inside":
-            if _inside(stack, a, r, share[r], bottom, vocabulary, config):
+        predicate = domain.offers(stack.things[r].category) or ""
+        if domain.predicates[predicate].geometry == CONTAINMENT:
+            if _inside(stack, a, r, share[r], bottom, domain, config):
                 holding.append((float(area[r]), predicate, r))
             continue
         contacts = _contacts(stack, a, r, bottom, config)
         needed = config.on_top_share
-        if contacts >= config.plenty_contacts and not vocabulary[stack.things[r].category].fixture:
+        fixed = domain.is_a(stack.things[r].category, domain.roles.fixture)
+        if contacts >= config.plenty_contacts and not fixed:
             needed = config.on_dish_share
         over_it = share[r] >= needed
         level = abs(float(stack.high_m[r, 2]) - bottom) <= config.contact_below_m
@@ -84,14 +86,9 @@ def _parent(
     return predicate, stack.things[r].id
 
 
-def _relation(vocabulary: Vocabulary, category: str) -> str:
-    receptacle = vocabulary[category].receptacle
-    return "" if receptacle is None else receptacle.relation
-
-
-def _takes(vocabulary: Vocabulary, receptacle: str, thing: str) -> bool:
-    known = vocabulary.find(receptacle) is not None and vocabulary.find(thing) is not None
-    return known and vocabulary.accepts(receptacle, thing)
+def _takes(domain: Domain, receptacle: str, thing: str) -> bool:
+    known = domain.find(receptacle) is not None and domain.find(thing) is not None
+    return known and domain.offers(receptacle) is not None and domain.accepts(receptacle, thing)
 
 
 def _touching(stack: Stack, a: int, config: PerceptionConfig) -> list[int]:
@@ -104,11 +101,12 @@ def _touching(stack: Stack, a: int, config: PerceptionConfig) -> list[int]:
     return [int(r) for r in np.flatnonzero(close)]
 
 
-def _bottom_m(stack: Stack, a: int, vocabulary: Vocabulary) -> float:
+def _bottom_m(stack: Stack, a: int, domain: Domain) -> float:
     """Height of the foot: the lowest visible point, or lower if the category is taller."""
-    size = vocabulary[stack.things[a].category].shape.get("size_m")
+    category = domain.find(stack.things[a].category)
+    size = None if category is None else category.size_m
     low, high = float(stack.low_m[a, 2]), float(stack.high_m[a, 2])
-    return low if size is None else min(low, high - float(size[2]))
+    return low if not size else min(low, high - float(size[2]))
 
 
 def _contacts(stack: Stack, a: int, r: int, bottom_m: float, config: PerceptionConfig) -> int:
@@ -139,7 +137,7 @@ def _inside(
     r: int,
     share: float,
     bottom_m: float,
-    vocabulary: Vocabulary,
+    domain: Domain,
     config: PerceptionConfig,
 ) -> bool:
     receptacle = stack.things[r]
@@ -149,7 +147,7 @@ def _inside(
     floor, rim = float(stack.low_m[r, 2]), float(stack.high_m[r, 2])
     if float(np.median(z)) < floor - config.rim_slack_m:
         return False
-    if vocabulary.encloses(receptacle.category):
+    if domain.encloses(receptacle.category):
         if float((z <= rim).mean()) < config.inside_share:
             return False
     elif float(stack.low_m[a, 2]) > rim + config.rim_slack_m:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 
+from forestall.domain.model import Domain
 from forestall.seams import PlanValidator, Replanner
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, same_step
@@ -92,7 +93,9 @@ class Intervention:
 
     def why_not(self, context: BoundaryContext, clock: Clock) -> Diagnosis | None:
         """Why what is left of the plan would not run from what is seen, None if it would."""
-        check = self._validator.check(rest_of(context), context.graph, context.task.goal)
+        check = self._validator.check(
+            rest_of(context, self._validator.domain), context.graph, context.task.goal
+        )
         clock.lap("validate")
         if check.ok:
             return None
@@ -154,7 +157,9 @@ class Intervention:
         clock: Clock,
     ) -> StrategyAnswer:
         """Go on only if the plan at hand still checks out on what is seen."""
-        check = self._validator.check(rest_of(context), context.graph, context.task.goal)
+        check = self._validator.check(
+            rest_of(context, self._validator.domain), context.graph, context.task.goal
+        )
         clock.lap("validate")
         decision = Decision.PROCEED if check.ok else Decision.STOP
         why = "no repair found; " + (
@@ -181,10 +186,10 @@ def look_again(verdict: Verdict, clock: Clock, why: str = "") -> StrategyAnswer:
     return StrategyAnswer(Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items())
 
 
-def rest_of(context: BoundaryContext) -> Plan:
+def rest_of(context: BoundaryContext, domain: Domain) -> Plan:
     """What is left of the plan, with the drive before it: where the robot stands matters."""
     start = context.index
-    if start > 0 and context.plan.subtasks[start - 1].skill == "navigate_to_obj":
+    if start > 0 and domain.skill(context.plan.subtasks[start - 1].skill).drives:
         start -= 1
     return Plan(context.plan.subtasks[start:], context.plan.goal)
 

@@ -172,8 +172,8 @@ class OnlineScene(Online):
 
 def _of_the_receiver(literal: Literal, subtask: Subtask) -> bool:
     """Whether a fact is a state of the thing that the subtask puts something into or onto."""
-    roles = subtask.roles()
-    return len(roles) == 2 and literal.is_state and roles["?target"] in literal.args
+    args = subtask.args
+    return len(args) == 2 and literal.is_state and args[1] in literal.args
 
 
 _SAID = {

@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from forestall.domain.model import Domain
 from forestall.seams import Disturbance, Environment
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import is_instance
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Subtask
-from forestall.vocabulary import Vocabulary
 
 
 class Activation(Protocol):
@@ -48,12 +48,12 @@ class FaultyEnvironment:
         environment: Environment,
         faults: Sequence[Activation],
         disturbance: Disturbance,
-        vocabulary: Vocabulary,
+        domain: Domain,
     ) -> None:
         self._inner = environment
         self._faults = tuple(faults)
         self._disturbance = disturbance
-        self._vocabulary = vocabulary
+        self._domain = domain
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
         self._mistaken: set[int] = set()
@@ -90,17 +90,32 @@ class FaultyEnvironment:
                 command = self._misled(command, fault)
             if fault.kind != "drop":
                 self._done[index] += 1
-        lets_go = command.skill in ("put_on", "put_in")
+        lets_go = self._lets_go(command)
         if lets_go:
             self._inner.approach(command.args[-1])
             self._drop(due)
         outcome = self._pretend(command) if silent else self._inner.execute(command)
         if not lets_go:
             self._drop(due)
-        if subtask.skill == "pick_up" and outcome.status is SkillStatus.SUCCEEDED:
+        if self._takes(subtask) and outcome.status is SkillStatus.SUCCEEDED:
             self._mistaken -= {i for i in self._mistaken if self._is_right(i, subtask.args[0])}
             self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
         return outcome
+
+    def _lets_go(self, subtask: Subtask) -> bool:
+        """Whether a skill puts what the hand holds somewhere."""
+        skill, containing = self._domain.skill(subtask.skill), self._domain.containing
+        return skill.hand is not None and any(
+            f.predicate in containing and f.args[:1] == (skill.hand,)
+            for e in skill.effects
+            for f in e.facts
+        )
+
+    def _takes(self, subtask: Subtask) -> bool:
+        """Whether a skill takes something into the hand."""
+        holding = self._domain.roles.holding
+        effects = self._domain.skill(subtask.skill).effects
+        return any(f.predicate == holding and f.value == "true" for e in effects for f in e.facts)
 
     def _notice(self, subtask: Subtask) -> None:
         """A mistake ends for good when a subtask names the wrong thing."""
@@ -113,7 +128,7 @@ class FaultyEnvironment:
     def _mixed_up(self, subtask: Subtask) -> Subtask:
         """The subtask with what is taken for something else; picking up looks anew."""
         args = subtask.args
-        for index in sorted(self._mistaken) if subtask.skill != "pick_up" else ():
+        for index in sorted(self._mistaken) if not self._takes(subtask) else ():
             by = _acts_on(self._faults[index])
             args = tuple(by if self._is_right(index, a) else a for a in args)
         return Subtask(subtask.skill, args)
@@ -158,10 +173,10 @@ class FaultyEnvironment:
         )
 
     def _same(self, named: str, given: str) -> bool:
-        a, b = self._vocabulary.canonical(named), self._vocabulary.canonical(given)
+        a, b = self._domain.canonical(named), self._domain.canonical(given)
         if is_instance(a):
             return a == b
-        category = self._vocabulary.find(b)
+        category = self._domain.find(b)
         return a == (b if category is None else category.name)
 
     def _misled(self, subtask: Subtask, fault: Activation) -> Subtask:
@@ -174,8 +189,9 @@ class FaultyEnvironment:
     def _pretend(self, subtask: Subtask) -> SkillOutcome:
         """Drive there as the skill would, do nothing, and report success."""
         before = self._inner.time_s
-        if subtask.skill != "navigate_to_obj":
-            self._inner.execute(Subtask("navigate_to_obj", subtask.args[-1:]))
+        drive = self._domain.driving()
+        if drive is not None and subtask.skill != drive.name:
+            self._inner.execute(Subtask(drive.name, subtask.args[-1:]))
         return SkillOutcome(SkillStatus.SUCCEEDED, self._inner.time_s - before)
 
 

@@ -20,13 +20,13 @@ from pydantic import (
     model_validator,
 )
 
+from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.seams import Disturbance, Environment
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.scene_faults import FaultTable, SceneFault
 from forestall.tasks.scene_faults import apply_scene_faults as apply_scene_faults  # noqa: PLC0414
-from forestall.types.plan import SKILLS, Plan, Subtask, same_step
-from forestall.vocabulary import Vocabulary, household
+from forestall.types.plan import Plan, Subtask, same_step
 
 
 def _readable(text: str) -> str:
@@ -39,7 +39,7 @@ def _readable(text: str) -> str:
 Step = Annotated[
     str,
     AfterValidator(_readable),
-    Field(description="a subtask as plans write it, for example put_in(Plate, Microwave)"),
+    Field(description="a subtask as plans write it, for example skill(Thing, Place)"),
 ]
 Occurrence = Annotated[int, Field(ge=1, description="which of several equal ones, from 1")]
 
@@ -79,12 +79,12 @@ class MoveStep(_Anchored):
 
 
 class ReplaceArgument(FaultTable):
-    """The plan names another thing; `argument` is the role, object or target."""
+    """The plan names another thing; `argument` is the role, as the skill names it."""
 
     kind: Literal["replace_argument"] = "replace_argument"
     step: Step
     occurrence: Occurrence = 1
-    argument: Literal["object", "target"]
+    argument: str
     by: str
 
 
@@ -129,10 +129,8 @@ class WrongReceptacle(_Execution):
 
     @model_validator(mode="after")
     def _has_receptacle(self) -> WrongReceptacle:
-        skill = Subtask.parse(self.step).skill
-        if len(SKILLS[skill]) < 2:
-            fits = ", ".join(s for s, roles in SKILLS.items() if len(roles) == 2)
-            raise ValueError(f"step {self.step} has no receptacle; it must be one of {fits}")
+        if len(Subtask.parse(self.step).args) < 2:
+            raise ValueError(f"step {self.step} has no receptacle: it has one argument")
         return self
 
 
@@ -172,7 +170,7 @@ def knowable(faults: Iterable[Any]) -> str:
     return "scene"
 
 
-def apply_plan_faults(plan: Plan, faults: Iterable[Any]) -> Plan:
+def apply_plan_faults(plan: Plan, faults: Iterable[Any], domain: Domain) -> Plan:
     """The plan with its plan faults, in order.
 
     Raises:
@@ -190,30 +188,29 @@ def apply_plan_faults(plan: Plan, faults: Iterable[Any]) -> Plan:
             steps.insert(_anchor(steps, fault, 1), moved)
         elif isinstance(fault, ReplaceArgument):
             at = _find(steps, fault.step, fault.occurrence, "replace_argument.step")
-            steps[at] = _with_argument(steps[at], fault.argument, fault.by)
+            steps[at] = _with_argument(steps[at], fault.argument, fault.by, domain)
         elif isinstance(fault, ReplacePlan):
             steps = [Subtask.parse(s) for s in fault.plan]
     return replace(plan, subtasks=tuple(steps))
 
 
-def check_steps(plan: Plan, faults: Iterable[Any], vocabulary: Vocabulary) -> None:
+def check_steps(plan: Plan, faults: Iterable[Any], domain: Domain) -> None:
     """Check the names in a plan that faults have changed, and that execution faults can happen.
 
     Raises:
         InputError: an unknown thing, or a fault of a step that the plan does not have.
     """
+    domain.check_plan(plan)
     for subtask in plan:
         for name in subtask.args:
-            vocabulary[name]
+            domain[name]
     for fault in faults:
         if not isinstance(fault, Drop | FailedAction | WrongObject | WrongReceptacle):
             continue
-        step = Subtask.parse(fault.step)
+        step = domain.check(Subtask.parse(fault.step))
         for name in (*step.args, *([fault.acts_on] if hasattr(fault, "acts_on") else [])):
-            vocabulary[name]
-        times = sum(
-            same_step(_canonical(s, vocabulary), _canonical(step, vocabulary)) for s in plan
-        )
+            domain[name]
+        times = sum(same_step(_canonical(s, domain), _canonical(step, domain)) for s in plan)
         if times < fault.occurrence:
             raise InputError(
                 f"{fault.kind}.step: {step} comes {times} time(s) in the plan, "
@@ -221,15 +218,15 @@ def check_steps(plan: Plan, faults: Iterable[Any], vocabulary: Vocabulary) -> No
             )
 
 
-def _canonical(subtask: Subtask, vocabulary: Vocabulary) -> Subtask:
-    return Subtask(subtask.skill, tuple(vocabulary.canonical(a) for a in subtask.args))
+def _canonical(subtask: Subtask, domain: Domain) -> Subtask:
+    return Subtask(subtask.skill, tuple(domain.canonical(a) for a in subtask.args))
 
 
 def wrap(
     environment: Environment,
     faults: Iterable[Any],
     disturbance: Disturbance,
-    vocabulary: Vocabulary | None = None,
+    domain: Domain,
 ) -> Environment:
     """The environment with its execution faults; the same one where there are none."""
     chosen = [
@@ -237,7 +234,7 @@ def wrap(
     ]
     if not chosen:
         return environment
-    return FaultyEnvironment(environment, chosen, disturbance, vocabulary or household())
+    return FaultyEnvironment(environment, chosen, disturbance, domain)
 
 
 def _find(steps: Sequence[Subtask], text: str, occurrence: int, field: str) -> int:
@@ -256,8 +253,8 @@ def _anchor(steps: Sequence[Subtask], fault: InsertStep | MoveStep, occurrence: 
     return _find(steps, fault.after or "", occurrence, f"{fault.kind}.after") + 1
 
 
-def _with_argument(step: Subtask, role: str, by: str) -> Subtask:
-    roles = SKILLS[step.skill]
+def _with_argument(step: Subtask, role: str, by: str, domain: Domain) -> Subtask:
+    roles = domain.skill(step.skill).roles
     if role not in roles:
         raise InputError(
             f"replace_argument.argument: {step} has no {role}; it has {', '.join(roles)}"

@@ -3,7 +3,7 @@
 Calls: command line and build → here → types. A task file holds the goal, the nominal plan, what
 the scene needs, and, when it speaks of things that the project does not know, their categories. A
 scenario file names a task and adds faults; a file of a set holds several scenarios of one task. All
-are checked against the vocabulary when loaded.
+are checked against the domain when loaded.
 """
 
 from __future__ import annotations
@@ -18,7 +18,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from forestall.attributes import parse_attribute
+from forestall.config import DEFAULT_DOMAIN
+from forestall.domain.checks import check_literal
+from forestall.domain.load import extend, load_domain, shipped_names
+from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.tasks.faults import Fault
 from forestall.tasks.schemas import (
@@ -29,12 +32,11 @@ from forestall.tasks.schemas import (
     SceneFile,
     TaskFile,
 )
-from forestall.types.facts import DERIVED, RELATIONS, category_of, is_instance
 from forestall.types.facts import Literal as Fact
+from forestall.types.facts import category_of, is_instance
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
-from forestall.vocabulary import Vocabulary, household, parse_category
 
 SETS = ("examples", "robofail", "irreversible", "harmless")
 """Sets of shipped scenarios; each but the first is a folder of its own."""
@@ -47,10 +49,10 @@ M = TypeVar("M", bound=BaseModel)
 
 @dataclass(frozen=True, slots=True)
 class LoadedTask:
-    """A task with the vocabulary that it is written in."""
+    """A task with the domain that it is written in, what the file adds included."""
 
     task: Task
-    vocabulary: Vocabulary
+    domain: Domain
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +110,9 @@ def schemas() -> dict[str, Any]:
     }
 
 
-def task_names() -> tuple[str, ...]:
-    """Names of the shipped tasks."""
-    return tuple(sorted(name for name, _ in _shipped("tasks")))
+def task_names(domain: str | None = None) -> tuple[str, ...]:
+    """Names of the shipped tasks, of one domain or of all."""
+    return tuple(sorted(n for n, _, d in _shipped("tasks") if domain in (None, d)))
 
 
 def scenario_names(of: str | None = None) -> tuple[str, ...]:
@@ -132,8 +134,8 @@ def load_task(name_or_file: str) -> LoadedTask:
         FileFormatError: the file is not TOML or has a wrong field.
         InputError: it speaks of a skill, category, attribute or value that is not known.
     """
-    source, text = _read("tasks", "task", name_or_file)
-    return _task(source, _validated(TaskFile, source, text))
+    source, text, domain = _read("tasks", "task", name_or_file)
+    return _task(source, _validated(TaskFile, source, text), domain)
 
 
 def load_scenario(name_or_file: str) -> Scenario:
@@ -144,7 +146,7 @@ def load_scenario(name_or_file: str) -> Scenario:
         FileFormatError: the file is not TOML or has a wrong field.
     """
     if _is_file(name_or_file):
-        source, text = _read("scenarios", "scenario", name_or_file)
+        source, text, _ = _read("scenarios", "scenario", name_or_file)
         data = _validated(ScenarioFile, source, text)
         return _scenario(data, data.task, "own")
     shipped = _scenarios()
@@ -157,11 +159,11 @@ def load_scenario(name_or_file: str) -> Scenario:
 def _scenarios() -> Mapping[str, Scenario]:
     """Every shipped scenario by name, in the order of sets, tasks and files."""
     found: dict[str, Scenario] = {}
-    for name, text in sorted(_shipped("scenarios")):
+    for name, text, _ in sorted(_shipped("scenarios")):
         data = _validated(ScenarioFile, name, text)
         found[data.name] = _scenario(data, data.task, SETS[0])
     for set_name in SETS[1:]:
-        for name, text in sorted(_shipped("scenarios", set_name)):
+        for name, text, _ in sorted(_shipped("scenarios", set_name)):
             several = _validated(ScenarioSetFile, f"{set_name}/{name}", text)
             for one in several.scenarios:
                 if one.name in found:
@@ -203,24 +205,27 @@ def _is_file(name_or_file: str) -> bool:
     return name_or_file.endswith(".toml") or "/" in name_or_file
 
 
-def _shipped(*folders: str) -> Iterator[tuple[str, str]]:
-    place = files("forestall").joinpath("domains", "household", *folders)
-    for entry in place.iterdir() if place.is_dir() else ():
-        if entry.name.endswith(".toml"):
-            yield entry.name.removesuffix(".toml"), entry.read_text(encoding="utf-8")
+def _shipped(*folders: str) -> Iterator[tuple[str, str, str]]:
+    """Name, text and domain of the files in a folder of every shipped domain."""
+    for domain in shipped_names():
+        place = files("forestall").joinpath("domains", domain, *folders)
+        for entry in place.iterdir() if place.is_dir() else ():
+            if entry.name.endswith(".toml"):
+                yield entry.name.removesuffix(".toml"), entry.read_text(encoding="utf-8"), domain
 
 
-def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str]:
+def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str, str]:
+    """Source, text and domain of a file; one of the user's own says its domain itself."""
     if _is_file(name_or_file):
         path = Path(name_or_file)
         try:
-            return str(path), path.read_text(encoding="utf-8")
+            return str(path), path.read_text(encoding="utf-8"), DEFAULT_DOMAIN
         except (OSError, UnicodeDecodeError) as error:
             raise FileFormatError(f"cannot read {kind} file {path}: {error}") from error
-    shipped = dict(_shipped(folder))
+    shipped = {name: (text, domain) for name, text, domain in _shipped(folder)}
     if name_or_file not in shipped:
         raise UnknownNameError(kind, name_or_file, shipped)
-    return name_or_file, shipped[name_or_file]
+    return name_or_file, *shipped[name_or_file]
 
 
 def _validated(model: type[M], source: str, text: str) -> M:
@@ -235,43 +240,34 @@ def _validated(model: type[M], source: str, text: str) -> M:
         raise FileFormatError(f"{source}: {problems}") from error
 
 
-def _task(source: str, data: TaskFile) -> LoadedTask:
+def _task(source: str, data: TaskFile, of: str) -> LoadedTask:
     try:
-        vocabulary = _vocabulary(data)
-        goal = _goal(data.goal, vocabulary)
-        plan = Plan.parse(data.plan, data.goal.text)
+        domain = _domain(data, data.domain or of)
+        goal = _goal(data.goal, domain)
+        plan = domain.check_plan(Plan.parse(data.plan, data.goal.text))
         for subtask in plan:
             for name in subtask.args:
-                vocabulary[name]
-        task = Task(data.name, data.title, goal, plan, _scene(data.scene, vocabulary))
+                domain[name]
+        task = Task(data.name, data.title, goal, plan, _scene(data.scene, domain))
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
-    return LoadedTask(task, vocabulary)
+    return LoadedTask(task, domain)
 
 
-def _vocabulary(data: TaskFile) -> Vocabulary:
-    """The shipped vocabulary with what the file adds to it."""
-    known = household()
-    attributes = {
-        name: parse_attribute(name, table.model_dump(exclude_none=True), known.attributes.get(name))
-        for name, table in data.attributes.items()
-    }
-    values = {a.name: a.values for a in {**known.attributes, **attributes}.values()}
-    categories = {
-        name: parse_category(name, table, values, known.categories.get(name))
-        for name, table in data.categories.items()
-    }
-    return known.extended(categories, attributes)
+def _domain(data: TaskFile, name: str) -> Domain:
+    """The task's domain with what the file adds to it."""
+    attributes = {n: t.model_dump(exclude_none=True) for n, t in data.attributes.items()}
+    return extend(load_domain(name), data.categories, attributes)
 
 
-def _goal(data: GoalFile, vocabulary: Vocabulary) -> Goal:
+def _goal(data: GoalFile, domain: Domain) -> Goal:
     for variable, category in data.variables.items():
         if not variable.startswith("?"):
             raise InputError(f"goal variable {variable!r} must start with '?'")
-        vocabulary[category]
+        domain[category]
 
     def facts(texts: list[str]) -> tuple[Fact, ...]:
-        return tuple(_fact(t, data.variables, vocabulary) for t in texts)
+        return tuple(_fact(t, data.variables, domain) for t in texts)
 
     return Goal(
         text=data.text,
@@ -282,56 +278,50 @@ def _goal(data: GoalFile, vocabulary: Vocabulary) -> Goal:
     )
 
 
-def _fact(text: str, variables: Mapping[str, str], vocabulary: Vocabulary) -> Fact:
+def _fact(text: str, variables: Mapping[str, str], domain: Domain) -> Fact:
     fact = Fact.parse(text)
-    if fact.predicate in vocabulary.attributes:
-        values = vocabulary.values(fact.predicate)
-        if fact.value not in values:
-            raise UnknownNameError(f"value of {fact.predicate}", fact.value, values)
-    elif fact.predicate not in (*RELATIONS, *DERIVED):
-        known = (*vocabulary.attributes, *RELATIONS, *DERIVED)
-        raise UnknownNameError("fact", fact.predicate, known)
+    check_literal(domain, "goal", fact)
     for name in fact.args:
         if name.startswith("?"):
             if name not in variables:
                 raise UnknownNameError("goal variable", name, variables)
-        elif name != "gripper":
-            vocabulary[name]
+        elif name not in domain.robot.hands:
+            domain[name]
     return fact
 
 
-def _scene(data: SceneFile, vocabulary: Vocabulary) -> SceneNeeds:
+def _scene(data: SceneFile, domain: Domain) -> SceneNeeds:
     if not 0 <= data.clutter[0] <= data.clutter[1]:
         raise InputError(f"scene.clutter {list(data.clutter)}: write [least, most]")
     numbers: dict[str, int] = {}
     objects = []
     for need in data.objects:
-        category = vocabulary[need.category].name
+        category = domain[need.category].name
         for place in need.places:
-            vocabulary[place]
-        _check_states(category, need.states, vocabulary)
+            domain[place]
+        _check_states(category, need.states, domain)
         numbers[category] = numbers.get(category, 0) + 1
         objects.append(
             ObjectNeed(
                 id=need.id or f"{category}-{numbers[category]}",
                 category=category,
-                places=tuple(vocabulary.canonical(p) for p in need.places),
+                places=tuple(domain.canonical(p) for p in need.places),
                 states=tuple(sorted(need.states.items())),
                 in_front_of=need.in_front_of,
             )
         )
     overrides = []
     for name, states in data.fixtures.items():
-        _check_states(name, states, vocabulary)
-        instance = name if is_instance(name) else f"{vocabulary[name].name}-1"
+        _check_states(name, states, domain)
+        instance = name if is_instance(name) else f"{domain[name].name}-1"
         overrides += [(instance, a, v) for a, v in sorted(states.items())]
     return SceneNeeds(data.room, tuple(objects), tuple(overrides), data.clutter)
 
 
-def _check_states(name: str, states: Mapping[str, str], vocabulary: Vocabulary) -> None:
-    category = vocabulary[category_of(name)]
+def _check_states(name: str, states: Mapping[str, str], domain: Domain) -> None:
+    category = domain[category_of(name)]
     for attribute, value in states.items():
         if attribute not in category.attributes:
             raise UnknownNameError(f"attribute of {category.name}", attribute, category.attributes)
-        if value not in vocabulary.values(attribute):
-            raise UnknownNameError(f"{attribute} of {name}", value, vocabulary.values(attribute))
+        if value not in domain.values(attribute):
+            raise UnknownNameError(f"{attribute} of {name}", value, domain.values(attribute))

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from forestall.domain.model import Domain
+from forestall.domain.truth import truth
 from forestall.errors import InputError
 from forestall.seams import OracleView
 from forestall.types.episode import Event
@@ -19,8 +21,8 @@ from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.task import Goal
 
-MADE = ("sliced", "cracked", "broken")
-"""Kinds of events by which the first of their objects became the others."""
+FACTS = ("state", "relation")
+"""Kinds of events whose text is a fact; an event of another kind with several objects made them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,21 +30,22 @@ class _History:
     """The final state with all that led to it."""
 
     graph: SceneGraph
-    spoiled: frozenset[str]
+    domain: Domain
+    past: frozenset[Literal]  # history facts
     events: tuple[Event, ...]
     facts: tuple[Literal, ...]  # every fact that an event says became true
 
     @classmethod
-    def of(cls, oracle: OracleView) -> _History:
+    def of(cls, oracle: OracleView, domain: Domain) -> _History:
         events = oracle.events()
-        return cls(oracle.truth(), oracle.spoiled(), events, tuple(_facts(events)))
+        return cls(oracle.truth(), domain, oracle.history(), events, tuple(_facts(events)))
 
     def holds(self, literal: Literal) -> bool:
         """Whether a literal is true in the end."""
-        if literal.predicate == "spoiled":
-            wanted = literal.value == "true"
-            return any(_means(literal.args[0], n) for n in self.spoiled) == wanted
-        return self.graph.truth(literal) is Truth.TRUE
+        if literal.predicate in self.domain.histories:
+            positive = Literal(literal.predicate, literal.args)
+            return any(_covers(positive, f) for f in self.past) == (literal.value == "true")
+        return truth(self.graph, literal, self.domain) is Truth.TRUE
 
     def happened(self, literal: Literal) -> bool:
         """Whether a literal is true in the end or became true at any time."""
@@ -52,12 +55,13 @@ class _History:
         """When something first happened, and in which words; at 0 s if it was so at the start."""
         for event in self.events:
             fact = _fact(event)
-            if literal.predicate == "spoiled":
-                told = event.kind == "spoiled" and _means(literal.args[0], event.objects[0])
+            if literal.predicate in self.domain.histories:
+                same = event.kind == literal.predicate
+                told = same and _means(literal.args[0], event.objects[0])
             elif fact is not None:
                 told = _covers(literal, fact)
             else:  # what was made is what it is from then on
-                made = event.objects[1:] if event.kind in MADE else ()
+                made = () if event.kind in self.domain.histories else event.objects[1:]
                 told = any(_means(literal.args[0], o) and self._is(literal, o) for o in made)
             if told:
                 return event.time_s, event.text
@@ -65,11 +69,11 @@ class _History:
 
     def _is(self, literal: Literal, instance: str) -> bool:
         ground = Literal(literal.predicate, (instance, *literal.args[1:]), literal.value)
-        return self.graph.truth(ground) is Truth.TRUE
+        return truth(self.graph, ground, self.domain) is Truth.TRUE
 
     def why(self, literal: Literal) -> str:
         """How a literal that does not hold looks instead."""
-        if literal.predicate == "spoiled":
+        if literal.predicate in self.domain.histories:
             return ""
         node = self.graph.get(literal.args[0]) if len(literal.args) == 1 else None
         value = None if node is None else node.state(literal.predicate)
@@ -77,32 +81,39 @@ class _History:
 
     def cause(self, literal: Literal) -> str:
         """The words of the event behind something that must not have happened."""
-        if literal.predicate != "spoiled":
+        if literal.predicate not in self.domain.histories:
             return ""
         texts = (
             e.text
             for e in self.events
-            if e.kind == "spoiled" and any(_means(literal.args[0], o) for o in e.objects)
+            if e.kind == literal.predicate and any(_means(literal.args[0], o) for o in e.objects)
         )
         text = next(texts, "")
         return f": {text}" if text else ""
 
 
 class TruthGoalChecker:
-    """Implements `GoalChecker` on an environment's oracle."""
+    """Implements `GoalChecker` on an environment's oracle.
+
+    Args:
+        domain: what the goal's facts mean.
+    """
+
+    def __init__(self, domain: Domain) -> None:
+        self._domain = domain
 
     def check(self, goal: Goal, oracle: OracleView) -> tuple[bool, bool | None, tuple[str, ...]]:
         """Strict success, weak success (None where the goal has no weaker check), failures.
 
         Failures are those of the binding that comes nearest to the goal.
         """
-        history = _History.of(oracle)
+        history = _History.of(oracle, self._domain)
         failures = _best(goal.variables, goal.literals, goal.never, history)
         weak = None if not goal.weak else not _best(goal.variables, goal.weak, (), history)
         return not failures, weak, failures
 
 
-def irreversible(goal: Goal, oracle: OracleView) -> tuple[tuple[float, str], ...]:
+def irreversible(goal: Goal, oracle: OracleView, domain: Domain) -> tuple[tuple[float, str], ...]:
     """What must never happen for a goal and has happened; () if nothing has.
 
     A variable of the goal means any instance of its category here: what was spoiled is lost, also
@@ -112,7 +123,7 @@ def irreversible(goal: Goal, oracle: OracleView) -> tuple[tuple[float, str], ...
         For each such literal the simulated seconds of its first event and that event in words, in
         the order of time; 0 seconds for what was so from the start.
     """
-    history = _History.of(oracle)
+    history = _History.of(oracle, domain)
     kinds = dict(goal.variables)
     literals = dict.fromkeys(literal.bind(kinds) for literal in goal.never)
     found = {history.first(literal) for literal in literals if history.happened(literal)}
@@ -125,7 +136,7 @@ def _facts(events: Sequence[Event]) -> Iterator[Literal]:
 
 def _fact(event: Event) -> Literal | None:
     """The literal that an event says became true, if it says one."""
-    if event.kind not in ("state", "relation"):
+    if event.kind not in FACTS:
         return None
     try:
         return Literal.parse(event.text)

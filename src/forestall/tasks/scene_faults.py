@@ -13,12 +13,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import category_of, is_instance
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import Vocabulary
-
-Axis = Literal["layout", "furniture", "colours", "light", "start", "clutter"]
 
 
 class FaultTable(BaseModel):
@@ -70,7 +68,7 @@ class Vary(FaultTable):
     """
 
     kind: Literal["vary"] = "vary"
-    axes: tuple[Axis, ...] = Field(min_length=1)
+    axes: tuple[str, ...] = Field(min_length=1)
     number: Annotated[int, Field(ge=1, le=1000)] = 1
 
 
@@ -84,9 +82,7 @@ class MoreClutter(FaultTable):
 SceneFault = AddObject | SetState | MoveObject | RemoveObject | Vary | MoreClutter
 
 
-def apply_scene_faults(
-    needs: SceneNeeds, faults: Iterable[Any], vocabulary: Vocabulary
-) -> SceneNeeds:
+def apply_scene_faults(needs: SceneNeeds, faults: Iterable[Any], domain: Domain) -> SceneNeeds:
     """The scene with its scene faults, and with the undisturbed one beside it where it has any.
 
     Other faults are left for their own functions.
@@ -101,19 +97,19 @@ def apply_scene_faults(
             continue
         changed = True
         if isinstance(fault, AddObject):
-            needs = _add(needs, fault, vocabulary)
+            needs = _add(needs, fault, domain)
         elif isinstance(fault, SetState):
-            needs = _set(needs, fault, vocabulary)
+            needs = _set(needs, fault, domain)
         elif isinstance(fault, MoveObject):
-            chosen = _chosen(needs, fault.object, "move_object.object", vocabulary)
-            places = _places(fault.places, "move_object.places", vocabulary)
+            chosen = _chosen(needs, fault.object, "move_object.object", domain)
+            places = _places(fault.places, "move_object.places", domain)
             objects = (
                 replace(o, places=places, in_front_of=None) if o in chosen else o
                 for o in needs.objects
             )
             needs = replace(needs, objects=tuple(objects))
         elif isinstance(fault, RemoveObject):
-            chosen = _chosen(needs, fault.object, "remove_object.object", vocabulary)
+            chosen = _chosen(needs, fault.object, "remove_object.object", domain)
             needs = replace(needs, objects=tuple(o for o in needs.objects if o not in chosen))
         elif isinstance(fault, Vary):
             numbers = dict(needs.vary) | dict.fromkeys(fault.axes, fault.number)
@@ -123,9 +119,9 @@ def apply_scene_faults(
     return replace(needs, undisturbed=before) if changed else needs
 
 
-def _add(needs: SceneNeeds, fault: AddObject, vocabulary: Vocabulary) -> SceneNeeds:
-    category = vocabulary[fault.category]
-    if category.fixture:
+def _add(needs: SceneNeeds, fault: AddObject, domain: Domain) -> SceneNeeds:
+    category = domain[fault.category]
+    if domain.is_a(category.name, domain.roles.fixture):
         raise InputError(
             f"add_object.category: {category.name} is a fixture; fixtures belong to the room"
         )
@@ -139,27 +135,27 @@ def _add(needs: SceneNeeds, fault: AddObject, vocabulary: Vocabulary) -> SceneNe
     if category_of(name) != category.name or not is_instance(name):
         raise InputError(f"add_object.id: {name!r} must read {category.name}-<number>")
     for attribute, value in fault.states.items():
-        _check_state(category.name, attribute, value, "add_object.states", vocabulary)
+        _check_state(category.name, attribute, value, "add_object.states", domain)
     front = fault.in_front_of
     if front is not None:
-        front = _chosen(needs, front, "add_object.in_front_of", vocabulary)[0].id
-    places = _places(fault.places, "add_object.places", vocabulary)
+        front = _chosen(needs, front, "add_object.in_front_of", domain)[0].id
+    places = _places(fault.places, "add_object.places", domain)
     for place in places:
-        if not vocabulary.accepts(place, category.name):
+        if not domain.accepts(place, category.name):
             raise InputError(f"add_object.places: {place} does not take {category.name}")
     need = ObjectNeed(name, category.name, places, tuple(sorted(fault.states.items())), front)
     return replace(needs, objects=(*needs.objects, need))
 
 
-def _set(needs: SceneNeeds, fault: SetState, vocabulary: Vocabulary) -> SceneNeeds:
-    name = vocabulary.canonical(fault.object)
-    category = vocabulary[name]
-    _check_state(category.name, fault.attribute, fault.value, "set_state", vocabulary)
-    if category.fixture:
+def _set(needs: SceneNeeds, fault: SetState, domain: Domain) -> SceneNeeds:
+    name = domain.canonical(fault.object)
+    category = domain[name]
+    _check_state(category.name, fault.attribute, fault.value, "set_state", domain)
+    if domain.is_a(category.name, domain.roles.fixture):
         instance = name if is_instance(name) else f"{name}-1"
         kept = tuple(f for f in needs.fixtures if f[:2] != (instance, fault.attribute))
         return replace(needs, fixtures=(*kept, (instance, fault.attribute, fault.value)))
-    chosen = _chosen(needs, name, "set_state.object", vocabulary)
+    chosen = _chosen(needs, name, "set_state.object", domain)
     objects = (
         replace(o, states=tuple(sorted((dict(o.states) | {fault.attribute: fault.value}).items())))
         if o in chosen
@@ -169,30 +165,27 @@ def _set(needs: SceneNeeds, fault: SetState, vocabulary: Vocabulary) -> SceneNee
     return replace(needs, objects=tuple(objects))
 
 
-def _check_state(
-    category: str, attribute: str, value: str, field: str, vocabulary: Vocabulary
-) -> None:
-    known = vocabulary[category].attributes
+def _check_state(category: str, attribute: str, value: str, field: str, domain: Domain) -> None:
+    known = domain[category].attributes
     if attribute not in known:
         raise UnknownNameError(f"attribute of {category} ({field})", attribute, known)
-    values = vocabulary.values(attribute)
+    values = domain.values(attribute)
     if value not in values:
         raise UnknownNameError(f"value of {attribute} ({field})", value, values)
 
 
-def _places(places: Sequence[str], field: str, vocabulary: Vocabulary) -> tuple[str, ...]:
-    names = tuple(vocabulary.canonical(p) for p in places)
+def _places(places: Sequence[str], field: str, domain: Domain) -> tuple[str, ...]:
+    names = tuple(domain.canonical(p) for p in places)
     for name in names:
-        if vocabulary[name].receptacle is None:
+        domain[name]
+        if domain.offers(name) is None:
             raise InputError(f"{field}: nothing can be put on or into {name}")
     return names
 
 
-def _chosen(
-    needs: SceneNeeds, name: str, field: str, vocabulary: Vocabulary
-) -> tuple[ObjectNeed, ...]:
+def _chosen(needs: SceneNeeds, name: str, field: str, domain: Domain) -> tuple[ObjectNeed, ...]:
     """The needs that an instance or category name means."""
-    wanted = vocabulary.canonical(name)
+    wanted = domain.canonical(name)
     found = tuple(o for o in needs.objects if wanted in (o.id, o.category))
     if not found:
         known = {n for o in needs.objects for n in (o.id, o.category)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -38,20 +38,22 @@ class ObjectFile(_Model):
 class SceneFile(_Model):
     """The scene table."""
 
-    room: Literal["kitchen", "living-room"] = "kitchen"
+    room: str = ""
     clutter: tuple[int, int] = (2, 6)
     objects: list[ObjectFile] = Field(default_factory=list)
     fixtures: dict[str, dict[str, str]] = Field(default_factory=dict)
 
 
 class AttributeFile(_Model):
-    """A new attribute, or other phrases for a known one; `parse_attribute` checks what it says."""
+    """A new attribute, or other phrases for a known one; `domain.load` checks what it says."""
 
     model_config = ConfigDict(
         extra="allow", frozen=True, json_schema_extra={"additionalProperties": False}
     )
 
     values: list[str] | None = None
+    bins: list[float] | None = None
+    unit: str | None = None
     phrases: dict[str, list[str]] | None = None
     camera: bool | None = None
     by_category: dict[str, dict[str, list[str]]] | None = None
@@ -62,6 +64,7 @@ class TaskFile(_Model):
 
     name: str = Field(pattern=_NAME)
     title: str
+    domain: str | None = None
     plan: list[str] = Field(min_length=1)
     goal: GoalFile
     scene: SceneFile = SceneFile()

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from forestall.domain.model import Domain
 from forestall.planning.validate import GraphValidator
 from forestall.seams import OracleView
 from forestall.strategies.intervention import rest_of
@@ -17,7 +18,6 @@ from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.task import Goal, Task
-from forestall.vocabulary import Vocabulary
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +40,14 @@ class TruthTrace:
         self._look: Callable[[BoundaryContext], TrueMoment] | None = None
         self._succeeded = True
 
-    def attach(self, oracle: OracleView, vocabulary: Vocabulary) -> None:
+    def attach(self, oracle: OracleView, domain: Domain) -> None:
         """Say whose truth is meant; `build` does."""
-        validator = GraphValidator(vocabulary)
+        validator = GraphValidator(domain)
 
         def look(context: BoundaryContext) -> TrueMoment:
             truth = oracle.truth()
             context = replace(context, index=context.index + self._done(context))
-            rest = rest_of(context)
+            rest = rest_of(context, domain)
             whole = validator.check(rest, truth, context.task.goal)
             if whole.ok:
                 return TrueMoment(True, True)

@@ -10,16 +10,17 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from forestall.domain.model import Domain
 from forestall.seams import Environment
 from forestall.types.episode import SkillStatus
 from forestall.types.observation import Observation
-from forestall.types.plan import SKILLS, Subtask
+from forestall.types.plan import Subtask
 
 NONSENSE = "NoSuchThing"
 
 
 def check_environment(
-    make: Callable[[], Environment], seed: int, subtasks: Sequence[Subtask]
+    make: Callable[[], Environment], seed: int, subtasks: Sequence[Subtask], domain: Domain
 ) -> list[str]:
     """Complaints about an environment; empty when it conforms.
 
@@ -27,6 +28,7 @@ def check_environment(
         make: builds a fresh environment.
         seed: of the scene to check.
         subtasks: a short plan that the scene allows; its outcomes must repeat.
+        domain: its skills are tried with nonsense.
 
     Returns:
         One sentence for each thing that is wrong: a run that does not repeat to the last bit, time
@@ -40,7 +42,7 @@ def check_environment(
                 "two fresh environments", _run(first, seed, subtasks), second, seed, subtasks
             ),
             *_repeats("two resets", _run(first, seed, subtasks), first, seed, subtasks),
-            *_refuses_nonsense(first, seed),
+            *_refuses_nonsense(first, seed, domain),
         ]
     finally:
         first.close()
@@ -145,11 +147,12 @@ def _same_ids(a: object, b: object) -> bool:
     return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b)
 
 
-def _refuses_nonsense(environment: Environment, seed: int) -> Iterator[str]:
+def _refuses_nonsense(environment: Environment, seed: int, domain: Domain) -> Iterator[str]:
     environment.reset(seed)
-    for skill, roles in SKILLS.items():
-        for name in (NONSENSE, f"{NONSENSE}-7", "", "Mug-99999"):
-            subtask = Subtask(skill, (name,) * len(roles))
+    known = next(iter(domain.categories))
+    for skill in domain.skills.values():
+        for name in (NONSENSE, f"{NONSENSE}-7", "", f"{known}-99999"):
+            subtask = Subtask(skill.name, (name,) * len(skill.parameters))
             try:
                 outcome = environment.execute(subtask)
             except Exception as error:  # noqa: BLE001  (that nothing is raised is what is checked)

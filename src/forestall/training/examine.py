@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from forestall.domain.model import Domain
 from forestall.embeddings.crops import INPUT_PIXELS
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.errors import InputError
 from forestall.perception.learned import LearnedStateEstimator, Question
 from forestall.training.measure import Answers
 from forestall.training.shards import Crops
-from forestall.vocabulary import Vocabulary
 
 Vectors = npt.NDArray[np.float32]
 Progress = Callable[[int, int, str], None]
@@ -38,16 +38,14 @@ def vectors(encoder: TwoTowerEncoder, crops: Crops, progress: Progress | None = 
     return np.concatenate(found)
 
 
-def answers(
-    encoder: TwoTowerEncoder, rows: Vectors, crops: Crops, vocabulary: Vocabulary
-) -> Answers:
+def answers(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops, domain: Domain) -> Answers:
     """One answer for each crop and each of its states that are known.
 
     The rules are those of `LearnedStateEstimator`: nothing is said of what is too small or fits two
     values, and nothing else of what is read as broken.
     """
-    estimator = LearnedStateEstimator(encoder, vocabulary)
-    order = list(vocabulary.attributes)
+    estimator = LearnedStateEstimator(encoder, domain)
+    order = list(domain.attributes)
     parts: list[Answers] = []
     for category in sorted({c for c in crops.category.tolist() if c}):
         here = np.flatnonzero(crops.category == category)

@@ -20,14 +20,14 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from forestall.domain.model import Domain
 from forestall.embeddings.tokens import tokens, words
 from forestall.errors import InputError
 from forestall.training.augment import augment
 from forestall.training.network import TwoTowers
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.shards import Crops
 from forestall.training.texts import ANY_THING, PLAIN, SAYINGS, Writer
-from forestall.types.plan import SKILLS
-from forestall.vocabulary import ATTRIBUTES, Vocabulary
 
 Report = Callable[[int, int, str], None]
 
@@ -62,26 +62,26 @@ class TrainConfig:
             raise InputError("training takes at least 1 step and batches of at least 8")
 
 
-def known_words(vocabulary: Vocabulary) -> frozenset[str]:
+def known_words(domain: Domain) -> frozenset[str]:
     """Every word that training may write, made-up names apart."""
     texts = [*PLAIN, *ANY_THING, *(t for s in SAYINGS.values() for t in s), "kitchen room with and"]
-    texts += [skill.replace("_", " ") for skill in SKILLS]
-    for name, category in vocabulary.categories.items():
+    texts += [skill.replace("_", " ") for skill in domain.skills]
+    for name, category in domain.categories.items():
         texts += [name, category.words, *category.synonyms]
         for a in category.attributes:
-            if vocabulary.attributes[a].camera:
-                texts += [p for v in vocabulary.values(a) for p in vocabulary.phrases(name, a, v)]
+            if domain.attributes[a].camera:
+                texts += [p for v in domain.values(a) for p in domain.phrases(name, a, v)]
     return frozenset(w for t in texts for w in words(t))
 
 
 class _Batches:
     """Draws crops, rare categories more often than they occur, and the texts about them."""
 
-    def __init__(self, crops: Crops, vocabulary: Vocabulary, config: TrainConfig) -> None:
+    def __init__(self, crops: Crops, domain: Domain, config: TrainConfig) -> None:
         self.rng = np.random.default_rng([config.seed, 7])
         self.generator = torch.Generator().manual_seed(config.seed)
-        self.writer = Writer(vocabulary, self.rng)
-        self.known = known_words(vocabulary)
+        self.writer = Writer(domain, self.rng)
+        self.known = known_words(domain)
         self._order = sorted(self.known)
         self._crops = crops
         self._config = config
@@ -180,14 +180,14 @@ class _Batches:
 
 
 def train(
-    crops: Crops, vocabulary: Vocabulary, config: TrainConfig, report: Report
+    crops: Crops, domain: Domain, config: TrainConfig, report: Report
 ) -> tuple[TwoTowers, list[dict[str, float]]]:
     """Train from nothing; returns the averaged towers and the losses on the way."""
     if config.threads:
         torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    batches = _Batches(crops, vocabulary, config)
+    batches = _Batches(crops, domain, config)
     towers = TwoTowers().to(device)
     towers.image.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     average = copy.deepcopy(towers).eval()

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from forestall.errors import InputError
 from forestall.training.measure import Floats, Values, values_of
-from forestall.vocabulary import ATTRIBUTES
+from forestall.training.questions import ATTRIBUTES
 
 _TEMPERATURES = (0.5, 20.0)
 """An attribute that is always right on the development pictures would get ever surer."""

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import InputError, UnknownNameError
-from forestall.vocabulary import ATTRIBUTES
+from forestall.training.questions import ATTRIBUTES
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from forestall.domain.model import Domain
 from forestall.embeddings.twotower import DESCRIPTION_NAME, Description, TwoTowerEncoder
 from forestall.errors import InputError
 from forestall.records.record import replace_file
@@ -20,7 +21,6 @@ from forestall.training import shards
 from forestall.training.examine import answers, large_only, logits, vectors
 from forestall.training.fitting import fit_temperature, fit_threshold
 from forestall.types.encoder import StateReading
-from forestall.vocabulary import Vocabulary
 
 Progress = Callable[[int, int, str], None]
 
@@ -53,7 +53,7 @@ class Recipe:
 
 
 def train(
-    pictures: Path, out: Path, vocabulary: Vocabulary, recipe: Recipe, progress: Progress
+    pictures: Path, out: Path, domain: Domain, recipe: Recipe, progress: Progress
 ) -> Description:
     """Train on `pictures` and write image.onnx, text.onnx and encoder.json into `out`.
 
@@ -71,7 +71,7 @@ def train(
     config = fit.TrainConfig(seed=recipe.seed, steps=recipe.steps, batch=recipe.batch)
     crops = shards.read(pictures, "train")
     options = shards.options(pictures)
-    towers, history = fit.train(crops, vocabulary, config, progress)
+    towers, history = fit.train(crops, domain, config, progress)
     network.export(towers, out)
     made = {
         "crops": int((crops.category != "").sum()),
@@ -81,13 +81,13 @@ def train(
         "last losses": history[-1],
     }
     reading = StateReading(scale=float(towers.scale.detach()), threshold={"": 0.0}, least_area=0)
-    description = Description(NAME, fit.known_words(vocabulary), reading, made)
+    description = Description(NAME, fit.known_words(domain), reading, made)
     write(out, description)
-    return calibrate(pictures, out, vocabulary, recipe.reading, progress)
+    return calibrate(pictures, out, domain, recipe.reading, progress)
 
 
 def calibrate(
-    pictures: Path, out: Path, vocabulary: Vocabulary, config: ReadingConfig, progress: Progress
+    pictures: Path, out: Path, domain: Domain, config: ReadingConfig, progress: Progress
 ) -> Description:
     """Fit temperature and threshold of each attribute on the development pictures and write them.
 
@@ -99,7 +99,7 @@ def calibrate(
     encoder = TwoTowerEncoder(out)
     crops = shards.read(pictures, "development")
     rows = vectors(encoder, crops, progress)
-    found = large_only(answers(encoder, rows, crops, vocabulary), config.least_area)
+    found = large_only(answers(encoder, rows, crops, domain), config.least_area)
     plain = logits(encoder, found)
     temperature = fit_temperature(plain, found.truth, found.attribute)
     divisors = np.array([temperature[a] for a in found.attribute.tolist()])

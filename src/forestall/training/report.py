@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from forestall.domain.load import load_domain
 from forestall.embeddings.crops import INPUT_PIXELS, crops
 from forestall.embeddings.twotower import TOWERS, TwoTowerEncoder, shipped
 from forestall.training import shards, words, zero_shot
@@ -22,7 +23,6 @@ from forestall.training.examine import Vectors, answers, vectors
 from forestall.training.measure import measure
 from forestall.training.measure_tables import as_json, write_tables
 from forestall.training.page import Synonym, write_page
-from forestall.vocabulary import household
 
 Progress = Callable[[int, int, str], None]
 
@@ -42,7 +42,7 @@ def examine(
     encoder = TwoTowerEncoder(model)
     there = shards.read(pictures, split)
     rows = vectors(encoder, there, progress)
-    said = answers(encoder, rows, there, household())
+    said = answers(encoder, rows, there, load_domain("household"))
     found = measure(said)
     questions = zero_shot.new_questions(encoder, rows, there)
     things = []
@@ -51,7 +51,7 @@ def examine(
         things = zero_shot.new_things(encoder, vectors(encoder, others, progress), others)
     near = [
         Synonym(p.word.word, p.nearest, p.word.category, p.similarity, p.right, p.word.group)
-        for p in words.nearest(encoder, words.word_list(), household())
+        for p in words.nearest(encoder, words.word_list(), load_domain("household"))
     ]
     named = category_accuracy(encoder, rows, there)
     took_ms = frame_ms(encoder)
@@ -85,9 +85,9 @@ def examine(
 
 def category_accuracy(encoder: TwoTowerEncoder, rows: Vectors, there: shards.Crops) -> float:
     """Share of the crops whose nearest category name is theirs."""
-    vocabulary = household()
-    names = sorted(vocabulary.categories)
-    texts = encoder.encode([f"a {vocabulary[n].words}" for n in names])
+    domain = load_domain("household")
+    names = sorted(domain.categories)
+    texts = encoder.encode([f"a {domain[n].words}" for n in names])
     objects = there.category != ""
     nearest = np.array(names)[(rows[objects] @ texts.T).argmax(axis=1)]
     return float(np.mean(nearest == there.category[objects]))

@@ -15,11 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
+from forestall.domain.model import Domain
 from forestall.errors import SceneError
+from forestall.training.questions import ATTRIBUTES
 from forestall.types.facts import category_of
 from forestall.types.observation import Frame, Intrinsics
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import ATTRIBUTES, Vocabulary
+from forestall.worlds.kitchen.catalogue import Catalogue, catalogue
 from forestall.worlds.kitchen.environment import SCAN_TILT_RAD
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.rendering import make_renderer
@@ -79,15 +81,19 @@ class Artist:
     """Draws scenes and pictures; remembers what it has shown, so that rare things come next.
 
     Args:
-        vocabulary: categories.
+        domain: categories.
         config: how scenes are drawn.
         renderer: by name.
     """
 
-    vocabulary: Vocabulary
+    domain: Domain
     config: SceneConfig = field(default_factory=SceneConfig)
     renderer: str = "auto"
     shown: Counter[str] = field(default_factory=Counter)
+    _catalogue: Catalogue = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._catalogue = catalogue(self.domain)
 
     def pictures(self, seed: int) -> Iterator[Picture]:
         """Every picture of one scene; none where the seed's scene cannot be built."""
@@ -119,7 +125,7 @@ class Artist:
             room = "living-room" if rng.uniform() < self.config.living_rooms else "kitchen"
             needs = SceneNeeds(room, self._needs(room, rng), (), (0, 2))
             try:
-                return build_scene(needs, seed * 8 + attempt, self.vocabulary)
+                return build_scene(needs, seed * 8 + attempt, self._catalogue)
             except SceneError:
                 continue
         return None
@@ -127,7 +133,7 @@ class Artist:
     def _needs(self, room: str, rng: np.random.Generator) -> tuple[ObjectNeed, ...]:
         categories = [
             c
-            for n, c in sorted(self.vocabulary.categories.items())
+            for n, c in sorted(self._catalogue.categories.items())
             if not c.fixture and n not in ROOM_THINGS[room]
         ]
         rarity = np.array([1.0 / (8 + self.shown[c.name]) for c in categories])
@@ -151,9 +157,9 @@ class Artist:
         """One receptacle that takes the thing, and no two of those that take one thing only."""
         options = [
             n
-            for n, c in sorted(self.vocabulary.categories.items())
+            for n, c in sorted(self._catalogue.categories.items())
             if c.receptacle is not None
-            and self.vocabulary.accepts(n, name)
+            and self._catalogue.accepts(n, name)
             and n not in full
             and (n in names if not c.fixture else room == "kitchen")
             and n not in ("Floor", "Shelf", "TVStand", "CounterTop", "DiningTable")
@@ -161,7 +167,7 @@ class Artist:
         if not options:
             return ()
         chosen = options[int(rng.integers(len(options)))]
-        receptacle = self.vocabulary[chosen].receptacle
+        receptacle = self._catalogue[chosen].receptacle
         if receptacle is not None and receptacle.capacity is not None:
             full.add(chosen)
         return (chosen,)
@@ -214,11 +220,11 @@ class Artist:
             for n in sorted(world.bodies.states)
             if n in world.bodies.present
             and n != thing
-            and self.vocabulary[n].receptacle is not None
-            and self.vocabulary.accepts(n, category_of(thing))
+            and self._catalogue[n].receptacle is not None
+            and self._catalogue.accepts(n, category_of(thing))
         ]
         for index in rng.permutation(len(options))[:3]:
-            receptacle = self.vocabulary[options[int(index)]].receptacle
+            receptacle = self._catalogue[options[int(index)]].receptacle
             inside = [p for p in world.bodies.parents.values() if p == options[int(index)]]
             if receptacle is None or (receptacle.capacity or 99) <= len(inside):
                 continue

@@ -23,12 +23,14 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.config import PICTURE_SEEDS
+from forestall.domain.load import extend, shipped
+from forestall.domain.model import Domain
 from forestall.embeddings.crops import MARGIN, crop, whole
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.records.record import replace_file
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, Picture, SceneConfig
-from forestall.vocabulary import ATTRIBUTES, Vocabulary, household, parse_category
 
 Progress = Callable[[int, int, str], None]
 
@@ -131,8 +133,8 @@ def make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> 
 
 def make_shard(out: Path, config: PictureConfig, split: str, first: int) -> Path:
     """Draw the scenes of one shard and write it."""
-    vocabulary = household() if split != "unseen" else unseen_things()
-    artist = Artist(vocabulary, config.scene, config.renderer)
+    domain = shipped("household") if split != "unseen" else unseen_things()
+    artist = Artist(domain, config.scene, config.renderer)
     count = min(SCENES_PER_SHARD, getattr(config, split) - first)
     rows: list[_Row] = []
     frames = 0
@@ -197,10 +199,10 @@ def unseen_file() -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def unseen_things() -> Vocabulary:
+def unseen_things() -> Domain:
     """The household with the things that the encoder is not trained on."""
     tables = unseen_file()["categories"]
-    return household().extended({n: parse_category(n, t) for n, t in tables.items()})
+    return extend(shipped("household"), tables, {})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

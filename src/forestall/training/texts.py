@@ -1,6 +1,6 @@
 """What the encoder is told about its pictures, in ever other words.
 
-Called by `fit.py`; calls the vocabulary. A thing goes by its names, sometimes by "thing" or by a
+Called by `fit.py`; calls the domain. A thing goes by its names, sometimes by "thing" or by a
 word that does not exist, so that "a dirty jug" is understood before anyone has seen a jug.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forestall.types.plan import SKILLS, Subtask
-from forestall.vocabulary import Vocabulary
+from forestall.domain.model import Domain
+from forestall.types.plan import Subtask
 
 PLAIN = ("{thing}", "a {thing}", "a photo of a {thing}", "a picture of a {thing}", "the {thing}")
 ANY_THING = ("object", "thing", "item")
@@ -52,19 +52,19 @@ class Writer:
     """Draws texts.
 
     Args:
-        vocabulary: categories, attributes, phrases.
+        domain: categories, attributes, phrases.
         rng: random choices.
     """
 
-    def __init__(self, vocabulary: Vocabulary, rng: np.random.Generator) -> None:
-        self._vocabulary = vocabulary
+    def __init__(self, domain: Domain, rng: np.random.Generator) -> None:
+        self._domain = domain
         self._rng = rng
-        self.categories = tuple(sorted(vocabulary.categories))
+        self.categories = tuple(sorted(domain.categories))
         self.questions = tuple(
-            Question(name, a, vocabulary.values(a))
+            Question(name, a, domain.values(a))
             for name in self.categories
-            for a in vocabulary[name].attributes
-            if vocabulary.attributes[a].camera
+            for a in domain[name].attributes
+            if domain.attributes[a].camera
         )
 
     def name(self, category: str, *, disguise: float = 0.2) -> str:
@@ -74,7 +74,7 @@ class Writer:
             return self._pick(ANY_THING)
         if draw < disguise:
             return "".join(self._pick(_SYLLABLES) for _ in range(int(self._rng.integers(2, 4))))
-        found = self._vocabulary[category]
+        found = self._domain[category]
         if found.synonyms and self._rng.uniform() < 0.35:
             return self._pick(found.synonyms)
         return found.words
@@ -85,8 +85,8 @@ class Writer:
 
     def state(self, category: str, attribute: str, value: str, *, name: str | None = None) -> str:
         """A phrase that says a state."""
-        phrase = self._pick(self._vocabulary.phrases(category, attribute, value))
-        words = self._vocabulary[category].words
+        phrase = self._pick(self._domain.phrases(category, attribute, value))
+        words = self._domain[category].words
         return phrase.replace(words, name or self.name(category))
 
     def answers(self, question: Question) -> list[str]:
@@ -108,16 +108,16 @@ class Writer:
 
     def sayings(self, count: int) -> tuple[list[str], list[str]]:
         """Two ways to say each of `count` different subtasks."""
-        skills = sorted(SKILLS)
+        skills = sorted(self._domain.skills)
         seen: dict[Subtask, None] = {}
         while len(seen) < count:
             skill = self._pick(skills)
-            args = tuple(self._pick(self.categories) for _ in SKILLS[skill])
+            args = tuple(self._pick(self.categories) for _ in self._domain.skills[skill].parameters)
             seen[Subtask(skill, args)] = None
         ones, others = [], []
         for subtask in seen:
             names = [self.name(c, disguise=0.0) for c in subtask.args]
-            ones.append(subtask.words())
+            ones.append(self._domain.words(subtask))
             others.append(self._pick(SAYINGS[subtask.skill]).format(*names))
         return ones, others
 
@@ -125,7 +125,7 @@ class Writer:
         """Two names for each of `count` categories."""
         order = self._rng.permutation(len(self.categories))[:count]
         chosen = [self.categories[int(i)] for i in order]
-        ones = [self._vocabulary[c].words for c in chosen]
+        ones = [self._domain[c].words for c in chosen]
         return ones, [self.thing(c) for c in chosen]
 
     def _pick(self, options: Sequence[str]) -> str:

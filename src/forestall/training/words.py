@@ -1,6 +1,6 @@
 """Where a text encoder puts household words that it was never told about.
 
-Called by the measurement of encoders and by its tests; calls an encoder and the vocabulary. The
+Called by the measurement of encoders and by its tests; calls an encoder and the domain. The
 list is `data/encoder_words.toml`: words that share a part with a name of their category, and words
 that only their meaning brings near.
 """
@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from forestall.attributes import with_articles
+from forestall.domain.model import Domain
+from forestall.domain.phrases import with_articles
 from forestall.errors import FileFormatError
 from forestall.seams import TextEncoder
-from forestall.vocabulary import Vocabulary
 
 GROUPS = ("spelling", "meaning")
 _TEXT = "a {thing}"
@@ -79,22 +79,20 @@ def word_list(path: Path | None = None) -> tuple[Word, ...]:
     return tuple(Word(w, g, str(c)) for g in GROUPS for w, c in data.get(g, {}).items())
 
 
-def nearest(
-    encoder: TextEncoder, words: Sequence[Word], vocabulary: Vocabulary
-) -> tuple[Placed, ...]:
+def nearest(encoder: TextEncoder, words: Sequence[Word], domain: Domain) -> tuple[Placed, ...]:
     """Put every word to the category that has the most similar name, in the order of the words.
 
     Words and names are compared as "a <word>", by their cosines.
 
     Raises:
-        UnknownNameError: a word's category is not in the vocabulary.
+        UnknownNameError: a word's category is not in the domain.
     """
     for word in words:
-        vocabulary[word.category]
+        domain[word.category]
     names = [
         (category, name)
-        for category in sorted(vocabulary.categories)
-        for name in (vocabulary[category].spoken, *vocabulary[category].synonyms)
+        for category in sorted(domain.categories)
+        for name in (domain[category].spoken, *domain[category].synonyms)
     ]
     known = encoder.encode([_said(name) for _, name in names])
     cosines = encoder.encode([_said(w.word) for w in words]) @ known.T

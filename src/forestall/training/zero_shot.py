@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from forestall.attributes import parse_attribute
+from forestall.domain.load import extend
+from forestall.domain.model import Domain
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.training.examine import Vectors, answers
 from forestall.training.measure import Answers, Group, Values, measure
 from forestall.training.page import ZeroShot
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.shards import Crops, unseen_file, unseen_things
-from forestall.vocabulary import ATTRIBUTES, Vocabulary
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class Alias:
 class Unseen:
     """The household with things and questions that were not trained on."""
 
-    vocabulary: Vocabulary
+    domain: Domain
     categories: tuple[str, ...]
     aliases: tuple[Alias, ...]
 
@@ -50,13 +51,12 @@ class Unseen:
 def unseen() -> Unseen:
     """Read the shipped file."""
     data = unseen_file()
-    attributes = {n: parse_attribute(n, t, None) for n, t in data["attributes"].items()}
     aliases = tuple(
         Alias(name, t["attribute"], {k: tuple(v) for k, v in t["is"].items()}, tuple(t["of"]))
         for name, t in data["same_as"].items()
     )
-    vocabulary = unseen_things().extended({}, attributes)
-    return Unseen(vocabulary, tuple(data["categories"]), aliases)
+    domain = extend(unseen_things(), {}, data["attributes"])
+    return Unseen(domain, tuple(data["categories"]), aliases)
 
 
 def new_things(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[ZeroShot]:
@@ -66,9 +66,9 @@ def new_things(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[Ze
     if not chosen.any():
         return []
     part = _chosen(crops, chosen)
-    said = answers(encoder, rows[chosen], part, found.vocabulary)
+    said = answers(encoder, rows[chosen], part, found.domain)
     return [
-        _row(g, found.vocabulary[str(g.category)].words, str(g.attribute), forced)
+        _row(g, found.domain[str(g.category)].words, str(g.attribute), forced)
         for g, forced in _pairs(said, ATTRIBUTES)
     ]
 
@@ -76,22 +76,22 @@ def new_things(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[Ze
 def new_questions(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[ZeroShot]:
     """Other questions about known things."""
     found = unseen()
-    order = list(found.vocabulary.attributes)
+    order = list(found.domain.attributes)
     out = []
     for alias in found.aliases:
         old = crops.values[:, order.index(alias.of)]
-        new = _translated(old, alias, found.vocabulary)
+        new = _translated(old, alias, found.domain)
         chosen = np.isin(crops.category, alias.categories) & (new >= 0)
         if not chosen.any():
             continue
         values = np.full((int(chosen.sum()), len(order)), -1, dtype=np.int8)
         values[:, order.index(alias.attribute)] = new[chosen]
         part = replace(_chosen(crops, chosen), values=values)
-        said = answers(encoder, rows[chosen], part, _asking(found.vocabulary, alias))
-        values_of = {alias.attribute: found.vocabulary.values(alias.attribute)}
+        said = answers(encoder, rows[chosen], part, _asking(found.domain, alias))
+        values_of = {alias.attribute: found.domain.values(alias.attribute)}
         for g, forced in _pairs(said, values_of):
             asked = f"{alias.attribute} ({' / '.join(g.values)})"
-            out.append(_row(g, found.vocabulary[str(g.category)].words, asked, forced))
+            out.append(_row(g, found.domain[str(g.category)].words, asked, forced))
     return out
 
 
@@ -107,24 +107,21 @@ def _row(group: Group, what: str, asked: str, forced: float | None) -> ZeroShot:
     return ZeroShot(what, asked, figures.n, figures.balanced, figures.answered.value, forced)
 
 
-def _translated(
-    old: npt.NDArray[np.int8], alias: Alias, vocabulary: Vocabulary
-) -> npt.NDArray[np.int8]:
+def _translated(old: npt.NDArray[np.int8], alias: Alias, domain: Domain) -> npt.NDArray[np.int8]:
     """The new attribute's value for each old one, -1 where there is none."""
-    values = vocabulary.values(alias.of)
+    values = domain.values(alias.of)
     new = np.full(len(old), -1, dtype=np.int8)
-    for k, value in enumerate(vocabulary.values(alias.attribute)):
+    for k, value in enumerate(domain.values(alias.attribute)):
         new[np.isin(old, [values.index(v) for v in alias.values[value]])] = k
     return new
 
 
-def _asking(vocabulary: Vocabulary, alias: Alias) -> Vocabulary:
-    """The vocabulary in which the categories of an alias have its attribute only."""
+def _asking(domain: Domain, alias: Alias) -> Domain:
+    """The domain in which the categories of an alias have its attribute only."""
     changed = {
-        c: replace(vocabulary[c], attributes=(alias.attribute,), defaults=())
-        for c in alias.categories
+        c: replace(domain[c], attributes=(alias.attribute,), defaults=()) for c in alias.categories
     }
-    return vocabulary.extended(changed)
+    return replace(domain, categories={**domain.categories, **changed})
 
 
 def _chosen(crops: Crops, rows: npt.NDArray[np.bool_]) -> Crops:

@@ -1,9 +1,10 @@
 """Literals: facts about named things, and their three truth values.
 
 A literal is a variable (a predicate over names) with a value. State literals use the attribute as
-predicate and one of its values: `dirty(Plate-1)=clean`. Relations and derived predicates have the
-values `true` and `false`: `inside(Bowl-1, Microwave-1)`, `not inside(Bowl-1, Microwave-1)`.
-Arguments are instance names ("Plate-1"), category names ("Plate") or variables ("?object").
+predicate and one of its values: `torque(Nut-1)=tight`. Relations and derived predicates have the
+values `true` and `false`: `near(Nut-1, Tray-1)`, `not near(Nut-1, Tray-1)`. Arguments are instance
+names ("Nut-1"), category names ("Nut") or variables ("?thing"). Which predicates there are is the
+domain's affair.
 """
 
 from __future__ import annotations
@@ -16,32 +17,7 @@ from enum import Enum
 from forestall.errors import InputError
 
 GRIPPER = "gripper"
-
-RELATIONS = (
-    "above",
-    "behind",
-    "below",
-    "blocking",
-    "held_by",
-    "in_front_of",
-    "inside",
-    "left_of",
-    "near",
-    "on_top_of",
-    "right_of",
-)
-"""Every predicate that a scene-graph edge may carry (paper, Sec. 3 and Fig. 3)."""
-
-DERIVED = ("hand_empty", "located", "unblocked", "vacant", "accessible", "spoiled")
-"""Predicates computed from states and relations; `spoiled` is history and never seen.
-
-- hand_empty(): the gripper holds nothing.
-- located(x): the position of x is known.
-- unblocked(x): no y with blocking(y, x).
-- vacant(x): nothing is inside or on top of x.
-- accessible(x): x is not inside something closed.
-- spoiled(x): x has taken part in something that cannot be undone.
-"""
+"""Node id of the hand of a robot that has one; a domain may name other hands."""
 
 
 class Truth(Enum):
@@ -52,7 +28,7 @@ class Truth(Enum):
     UNOBSERVED = "unobserved"
 
 
-_TEXT = re.compile(r"^\s*(not\s+)?([a-z_]+)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]+))?\s*$")
+_TEXT = re.compile(r"^\s*(not\s+)?([a-z][a-z0-9_]*)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]\w*))?\s*$")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -100,7 +76,7 @@ class Literal:
 
 
 def category_of(name: str) -> str:
-    """The category part of an instance name: "StoveBurner-4" → "StoveBurner"."""
+    """The category part of an instance name: "Tray-4" → "Tray"."""
     head, _, tail = name.rpartition("-")
     return head if head and tail.isdigit() else name
 

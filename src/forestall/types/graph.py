@@ -7,13 +7,13 @@ equal graphs have equal text, JSON and hashes.
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from forestall.errors import FileFormatError, InputError
-from forestall.types.facts import GRIPPER, RELATIONS, Literal, Truth, category_of
+from forestall.types.facts import GRIPPER
 from forestall.types.observation import Vec3
 from forestall.types.plan import Subtask
 
@@ -88,7 +88,7 @@ class ObjectNode:
         return dict(self.states).get(attribute)
 
     def label(self) -> str:
-        """Category with its known states: "Plate (clean, intact)"."""
+        """Category with its known states: "Nut (clean, tight)"."""
         known = [v for _, v in self.states if v is not None]
         return f"{self.category} ({', '.join(known)})" if known else self.category
 
@@ -111,12 +111,12 @@ class SceneGraph:
 
     Args:
         nodes: object nodes; the gripper is the node "gripper" when present.
-        relations: edges between nodes; "held_by" points at "gripper".
+        relations: edges between nodes; what is held has one to the hand.
         subtask: the subtask that this graph was made for.
         hidden: ids of containers whose inside no view could reach; what is in them is unobserved.
 
     Raises:
-        InputError: an id twice, an edge to a node that is not there, an unknown predicate.
+        InputError: an id twice, an edge to a node that is not there.
     """
 
     nodes: tuple[ObjectNode, ...]
@@ -133,10 +133,6 @@ class SceneGraph:
             twice = sorted({n.id for n in self.nodes if [m.id for m in self.nodes].count(n.id) > 1})
             raise InputError(f"node ids must be unique; twice: {', '.join(twice)}")
         for r in self.relations:
-            if r.predicate not in RELATIONS:
-                raise InputError(
-                    f"unknown relation {r.predicate!r} in '{r}': known: {', '.join(RELATIONS)}"
-                )
             for end in (r.subject, r.object):
                 if end not in ids:
                     raise InputError(f"relation '{r}' names {end!r}, which is not a node")
@@ -154,23 +150,22 @@ class SceneGraph:
 
     @property
     def holding(self) -> str | None:
-        """What the gripper holds."""
-        return next((r.subject for r in self.relations if r.predicate == "held_by"), None)
+        """What the gripper holds: what is related to it, in whatever words of the domain."""
+        return next((r.subject for r in self.relations if r.object == GRIPPER), None)
 
-    def contents(self, node_id: str) -> tuple[str, ...]:
-        """Ids of what is directly inside or on top of a node."""
+    def contents(self, node_id: str, containing: Collection[str]) -> tuple[str, ...]:
+        """Ids of what is directly in, on or at a node, by the relations that say where things are.
+
+        A domain has them: `Domain.containing`.
+        """
         return tuple(
-            r.subject
-            for r in self.relations
-            if r.object == node_id and r.predicate in ("inside", "on_top_of")
+            r.subject for r in self.relations if r.object == node_id and r.predicate in containing
         )
 
-    def parents(self, node_id: str) -> tuple[str, ...]:
-        """Ids of what a node is directly inside or on top of."""
+    def parents(self, node_id: str, containing: Collection[str]) -> tuple[str, ...]:
+        """Ids of what a node is directly in, on or at."""
         return tuple(
-            r.object
-            for r in self.relations
-            if r.subject == node_id and r.predicate in ("inside", "on_top_of")
+            r.object for r in self.relations if r.subject == node_id and r.predicate in containing
         )
 
     def matches(self, name: str) -> tuple[str, ...]:
@@ -178,16 +173,6 @@ class SceneGraph:
         if self.get(name) is not None:
             return (name,)
         return tuple(n.id for n in self.nodes if n.category == name)
-
-    def truth(self, literal: Literal) -> Truth:
-        """The three-valued truth of a ground literal (instance names as arguments).
-
-        A category name as argument means "some instance of it": true if any instance makes it
-        true, false if all make it false.
-        """
-        return _any_truth(
-            [_ground_truth(self, g) for g in _groundings(self, literal)], literal.value == "false"
-        )
 
     def text(self) -> str:
         """Readable text, one fact a line, sorted."""
@@ -221,7 +206,7 @@ class SceneGraph:
 
         Raises:
             FileFormatError: not a scene graph, another format version, or a broken field.
-            InputError: a dangling relation, an id twice, an unknown predicate.
+            InputError: a dangling relation, or an id twice.
         """
         if not isinstance(data, dict) or "nodes" not in data:
             raise FileFormatError("not a scene graph: an object with 'nodes' is expected")
@@ -290,88 +275,3 @@ def _node(data: dict[str, Any]) -> ObjectNode:
         last_seen_s=float(data.get("last_seen_s", 0.0)),
         feature=None if feature is None else base64.b64decode(feature, validate=True),
     )
-
-
-def _groundings(graph: SceneGraph, literal: Literal) -> list[Literal]:
-    ground = [literal]
-    for position, name in enumerate(literal.args):
-        if graph.get(name) is None and category_of(name) == name:
-            ids = graph.matches(name)
-            ground = [
-                Literal(g.predicate, (*g.args[:position], i, *g.args[position + 1 :]), g.value)
-                for g in ground
-                for i in ids
-            ]
-    return ground
-
-
-def _any_truth(values: list[Truth], negative: bool) -> Truth:
-    """Three-valued "or"; for a negative literal "and" (no instance may make it true)."""
-    if negative:
-        if Truth.FALSE in values:
-            return Truth.FALSE
-        return Truth.UNOBSERVED if Truth.UNOBSERVED in values else Truth.TRUE
-    if Truth.TRUE in values:
-        return Truth.TRUE
-    return Truth.UNOBSERVED if Truth.UNOBSERVED in values or not values else Truth.FALSE
-
-
-def _of(value: bool, wanted: str) -> Truth:
-    return Truth.TRUE if value == (wanted == "true") else Truth.FALSE
-
-
-def _ground_truth(graph: SceneGraph, literal: Literal) -> Truth:
-    p, args, wanted = literal.predicate, literal.args, literal.value
-    if p == "hand_empty":
-        return _of(graph.holding is None, wanted)
-    node = graph.get(args[0]) if args else None
-    if p in RELATIONS:
-        return _relation_truth(graph, literal)
-    if p == "located":
-        return _of(node is not None and node.box_m is not None, wanted)
-    if node is None:
-        return Truth.UNOBSERVED
-    if p == "vacant":
-        if graph.contents(node.id):
-            return _of(False, wanted)
-        return Truth.UNOBSERVED if node.id in graph.hidden else _of(True, wanted)
-    if p == "unblocked":
-        blocked = any(r.predicate == "blocking" and r.object == node.id for r in graph.relations)
-        return _of(not blocked, wanted)
-    if p == "accessible":
-        return _accessible(graph, node.id, wanted)
-    if p == "spoiled":
-        return Truth.UNOBSERVED
-    value = node.state(p)
-    if value is None:
-        return Truth.UNOBSERVED
-    return Truth.TRUE if value == wanted else Truth.FALSE
-
-
-def _accessible(graph: SceneGraph, node_id: str, wanted: str) -> Truth:
-    for parent_id in graph.parents(node_id):
-        parent = graph.get(parent_id)
-        if parent is None:
-            continue
-        if parent.state("open") == "closed":
-            return _of(False, wanted)
-        deeper = _accessible(graph, parent_id, "true")
-        if deeper is not Truth.TRUE:
-            return _of(False, wanted)
-    return _of(True, wanted)
-
-
-def _relation_truth(graph: SceneGraph, literal: Literal) -> Truth:
-    subject, target = literal.args
-    present = any(
-        r.subject == subject and r.object == target and r.predicate == literal.predicate
-        for r in graph.relations
-    )
-    if present:
-        return _of(True, literal.value)
-    subject_node, target_node = graph.get(subject), graph.get(target)
-    if subject_node is None or target_node is None:
-        return Truth.UNOBSERVED
-    if literal.predicate != "held_by" and target in graph.hidden and not graph.parents(subject):
-        return Truth.UNOBSERVED
-    return _of(False, literal.value)

@@ -1,4 +1,4 @@
-"""Subtasks and plans: verbs of the skill set with typed arguments."""
+"""Subtasks and plans: skills with arguments, in order. Which skills there are a domain says."""
 
 from __future__ import annotations
 
@@ -6,66 +6,33 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from forestall.errors import InputError, UnknownNameError
+from forestall.errors import InputError
 from forestall.types.facts import category_of
 
-SKILLS: dict[str, tuple[str, ...]] = {
-    "navigate_to_obj": ("target",),
-    "pick_up": ("object",),
-    "put_on": ("object", "target"),
-    "put_in": ("object", "target"),
-    "open_obj": ("target",),
-    "close_obj": ("target",),
-    "toggle_on": ("target",),
-    "toggle_off": ("target",),
-    "slice_obj": ("object",),
-    "crack_obj": ("object",),
-    "pour": ("object", "target"),
-}
-"""Skill name → the roles of its arguments; lifted literals use "?object" and "?target"."""
-
-_TEXT = re.compile(r"^\s*\(?\s*([a-z_]+)\s*[(,]\s*([^()]*?)\s*\)\s*$")
+_TEXT = re.compile(r"^\s*\(?\s*([a-z][a-z0-9_]*)\s*[(,]\s*([^()]*?)\s*\)\s*$")
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Subtask:
-    """One skill with its arguments: category names ("Mug") or instance names ("Mug-1")."""
+    """One skill with its arguments: category names ("Nut") or instance names ("Nut-1")."""
 
     skill: str
     args: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        roles = SKILLS.get(self.skill)
-        if roles is None:
-            raise UnknownNameError("skill", self.skill, SKILLS)
-        if len(self.args) != len(roles):
-            raise InputError(
-                f"{self.skill} takes {len(roles)} argument(s) ({', '.join(roles)}), "
-                f"got {len(self.args)}: {', '.join(self.args)}"
-            )
 
     def __str__(self) -> str:
         return f"{self.skill}({', '.join(self.args)})"
 
     @classmethod
     def parse(cls, text: str) -> Subtask:
-        """Read "put_in(Plate, Microwave)" or "(put_in, Plate, Microwave)".
+        """Read "screw(Nut, Bolt)" or "(screw, Nut, Bolt)".
 
         Raises:
-            InputError: the text is no subtask, the skill is unknown or its arguments do not fit.
+            InputError: the text is no subtask.
         """
         match = _TEXT.match(text)
         if match is None:
-            raise InputError(f"cannot read {text!r} as a subtask: write put_in(Plate, Microwave)")
+            raise InputError(f"cannot read {text!r} as a subtask: write skill(Thing, Place)")
         return cls(match[1], tuple(a.strip() for a in match[2].split(",") if a.strip()))
-
-    def roles(self) -> dict[str, str]:
-        """Variable → argument, e.g. {"?object": "Plate-1", "?target": "Microwave-1"}."""
-        return {f"?{r}": a for r, a in zip(SKILLS[self.skill], self.args, strict=True)}
-
-    def words(self) -> str:
-        """The subtask as a phrase: "put in Plate Microwave"."""
-        return " ".join((self.skill.removesuffix("_obj").replace("_", " "), *self.args))
 
 
 def same_step(a: Subtask, b: Subtask) -> bool:

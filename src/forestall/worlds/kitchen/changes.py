@@ -182,7 +182,7 @@ def _put(stocker: Stocker, change: Change, freedom: tuple[bool, bool], tight: bo
             stocker.needed.remove(need.id)
             bodies.detach(need.id)
     by_id = {n.id: n for n in change.needs.objects}
-    for need in in_order(change.put, stocker.vocabulary):
+    for need in in_order(change.put, stocker.catalogue):
         behind = need.in_front_of
         if behind is None:
             stocker.put(need, change.blocked.get(need.id), tight)

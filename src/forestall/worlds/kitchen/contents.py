@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from forestall.types.facts import category_of
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import Vocabulary
+from forestall.worlds.kitchen.catalogue import Catalogue
 from forestall.worlds.kitchen.streams import Streams
 
 _SPARE = 3
@@ -70,23 +70,23 @@ class Contents:
 
 
 def contents_of(
-    needs: SceneNeeds, base: SceneNeeds, vocabulary: Vocabulary, streams: Streams
+    needs: SceneNeeds, base: SceneNeeds, catalogue: Catalogue, streams: Streams
 ) -> Contents:
     """Choose the contents of a scene.
 
     Args:
         needs: what the scene must contain.
         base: the same, before a scenario changed it.
-        vocabulary: categories.
+        catalogue: categories.
         streams: random streams of the seed.
     """
     added = {n.category for n in needs.objects} - {n.category for n in base.objects}
     of_task = {n.category for n in base.objects}
-    order, most = _ordered(base, of_task, vocabulary, streams.without("clutter"))
+    order, most = _ordered(base, of_task, catalogue, streams.without("clutter"))
     clutter = Clutter(_named(order, 0, most + _SPARE if most else 0), most)
     other = None
     if streams.varied("clutter"):
-        order, most = _ordered(base, of_task, vocabulary, streams)
+        order, most = _ordered(base, of_task, catalogue, streams)
         names = _named(order, 0, most + _SPARE if most else 0)
         other = Clutter(_without(names, added), most)
     count = needs.more_clutter
@@ -95,26 +95,26 @@ def contents_of(
     more = Clutter(_without(names, added), count)
 
     ids = {n.id for n in needs.objects}
-    things = {n.id: _needed(n, vocabulary) for n in base.objects}
-    things |= {n: _plain(n, vocabulary) for n in clutter.names}
-    prepared = _prepared(things.values(), ids | set(things), vocabulary)
-    new = {n.id: _needed(n, vocabulary) for n in needs.objects if n.id not in things}
+    things = {n.id: _needed(n, catalogue) for n in base.objects}
+    things |= {n: _plain(n, catalogue) for n in clutter.names}
+    prepared = _prepared(things.values(), ids | set(things), catalogue)
+    new = {n.id: _needed(n, catalogue) for n in needs.objects if n.id not in things}
     for name in (*(other.names if other else ()), *more.names):
         if name not in things:
-            new.setdefault(name, _plain(name, vocabulary))
+            new.setdefault(name, _plain(name, catalogue))
     used = ids | set(things) | set(new) | {t.name for t in prepared}
-    waiting = _prepared(new.values(), used, vocabulary)
+    waiting = _prepared(new.values(), used, catalogue)
     return Contents((*things.values(), *prepared, *new.values(), *waiting), clutter, other, more)
 
 
-def _needed(need: ObjectNeed, vocabulary: Vocabulary) -> Thing:
-    states = vocabulary.default_states(need.category) | dict(need.states)
+def _needed(need: ObjectNeed, catalogue: Catalogue) -> Thing:
+    states = catalogue.default_states(need.category) | dict(need.states)
     return Thing(need.id, need.category, states, need.id)
 
 
-def _plain(name: str, vocabulary: Vocabulary) -> Thing:
+def _plain(name: str, catalogue: Catalogue) -> Thing:
     category = category_of(name)
-    return Thing(name, category, vocabulary.default_states(category), name)
+    return Thing(name, category, catalogue.default_states(category), name)
 
 
 def _without(names: Sequence[str], categories: set[str]) -> tuple[str, ...]:
@@ -122,13 +122,13 @@ def _without(names: Sequence[str], categories: set[str]) -> tuple[str, ...]:
 
 
 def _ordered(
-    needs: SceneNeeds, of_task: set[str], vocabulary: Vocabulary, streams: Streams
+    needs: SceneNeeds, of_task: set[str], catalogue: Catalogue, streams: Streams
 ) -> tuple[list[str], int]:
     """Categories of clutter in random order, and how many pieces are wanted."""
-    parts = {c for n in of_task for c in (vocabulary[n].slices_into, vocabulary[n].cracks_into)}
+    parts = {c for n in of_task for c in (catalogue[n].slices_into, catalogue[n].cracks_into)}
     options = [
         name
-        for name, c in sorted(vocabulary.categories.items())
+        for name, c in sorted(catalogue.categories.items())
         if c.pickupable
         and not c.fixture
         and name not in of_task
@@ -152,12 +152,12 @@ def _named(order: Sequence[str], first: int, count: int) -> tuple[str, ...]:
     )
 
 
-def _prepared(things: Iterable[Thing], used: set[str], vocabulary: Vocabulary) -> list[Thing]:
+def _prepared(things: Iterable[Thing], used: set[str], catalogue: Catalogue) -> list[Thing]:
     """Slices and cracked eggs that wait for their turn."""
     used = set(used)
     made: list[Thing] = []
     for thing in things:
-        category = vocabulary[thing.category]
+        category = catalogue[thing.category]
         parts = [category.slices_into] * category.slices if category.slices_into else []
         parts += [category.cracks_into] if category.cracks_into else []
         for k, part in enumerate(parts):
@@ -167,5 +167,5 @@ def _prepared(things: Iterable[Thing], used: set[str], vocabulary: Vocabulary) -
             name = f"{part}-{number}"
             used.add(name)
             looks = f"{thing.looks}/{part}/{k}"
-            made.append(Thing(name, part, vocabulary.default_states(part), looks, thing.name))
+            made.append(Thing(name, part, catalogue.default_states(part), looks, thing.name))
     return made

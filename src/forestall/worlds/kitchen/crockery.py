@@ -117,7 +117,7 @@ def vessel(part: Assembly, category: str, shape: Mapping[str, Any], states: froz
     Args:
         part: where to build.
         category: its category (for its colours).
-        shape: `size_m` and the options `flare`, `handle`, `long_handle` of the vocabulary.
+        shape: `size_m` and the options `flare`, `handle`, `long_handle` of the catalogue.
         states: attributes that it can have.
     """
     rng = part.kit.rng

@@ -1,6 +1,6 @@
 """What happens by itself: after every skill the devices that run work on their contents.
 
-Reads device properties from the vocabulary and changes the household, to a fixpoint. Outcomes that
+Reads device properties from the catalogue and changes the household, to a fixpoint. Outcomes that
 cannot be undone are noted as spoiled, with an event, at the moment when they happen, so that they
 stay known whatever the final state looks like.
 
@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from forestall.types.facts import category_of
-from forestall.vocabulary import Device
+from forestall.worlds.kitchen.catalogue import Device
 from forestall.worlds.kitchen.household import Household, number_of
 
 

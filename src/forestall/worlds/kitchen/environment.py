@@ -16,17 +16,20 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
+from forestall.domain.model import Domain
 from forestall.errors import ForestallError, SceneError
 from forestall.seams import Renderer, World
 from forestall.types.episode import Event, SkillOutcome
+from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Subtask
 from forestall.types.scene import SceneNeeds
-from forestall.vocabulary import Vocabulary
 from forestall.worlds.kitchen import effects
+from forestall.worlds.kitchen.catalogue import Catalogue, catalogue
 from forestall.worlds.kitchen.household import Household, Placed
 from forestall.worlds.kitchen.naming import RefusalError
+from forestall.worlds.kitchen.needs import roomed
 from forestall.worlds.kitchen.rendering.memory import FrameMemory
 from forestall.worlds.kitchen.skills import Robot, SkillTimes, perform
 
@@ -85,7 +88,7 @@ class Stage(World, Protocol):
         """Everything back to the start of the scene."""
 
 
-Build = Callable[[SceneNeeds, int, Vocabulary], Stage]
+Build = Callable[[SceneNeeds, int, Catalogue], Stage]
 MakeRenderer = Callable[[Stage, Intrinsics], Renderer]
 
 
@@ -103,9 +106,9 @@ class KitchenOracle:
         """True attribute values of one instance, empty if there is no such instance now."""
         return self._current().states(instance)
 
-    def spoiled(self) -> frozenset[str]:
-        """Instances to which something irreversible has happened."""
-        return self._current().spoiled()
+    def history(self) -> frozenset[Literal]:
+        """What has happened and cannot be undone."""
+        return frozenset(Literal("spoiled", (x,)) for x in self._current().spoiled())
 
     def events(self) -> tuple[Event, ...]:
         """Everything that has happened since reset, in order."""
@@ -117,7 +120,7 @@ class KitchenEnvironment:
 
     Args:
         needs: what the scene must contain.
-        vocabulary: categories and rules.
+        domain: of the task, for the categories that it adds to the kitchen's own.
         renderer: "auto", or the name of one renderer of the embedded household.
         intrinsics: of the head camera; 640×480 with 60° of vertical view by default.
         times: duration of each skill.
@@ -130,7 +133,7 @@ class KitchenEnvironment:
     def __init__(
         self,
         needs: SceneNeeds,
-        vocabulary: Vocabulary,
+        domain: Domain,
         renderer: str = "auto",
         intrinsics: Intrinsics | None = None,
         *,
@@ -140,8 +143,8 @@ class KitchenEnvironment:
         make: MakeRenderer | None = None,
         frames: FrameMemory | None = None,
     ) -> None:
-        self._needs = needs
-        self._vocabulary = vocabulary
+        self._needs = roomed(needs)
+        self._catalogue = catalogue(domain)
         self._intrinsics = intrinsics or Intrinsics.from_vertical_fov(
             FRAME_WIDTH, FRAME_HEIGHT, VERTICAL_FOV_DEG
         )
@@ -164,12 +167,12 @@ class KitchenEnvironment:
         """
         if self._world is None or seed != self._seed:
             self._renderer = None
-            self._world = self._build(self._needs, seed, self._vocabulary)
+            self._world = self._build(self._needs, seed, self._catalogue)
             self._seed = seed
         else:
             self._world.reset()
         self._released = None
-        household = Household(self._vocabulary, self._world, self._world.instances)
+        household = Household(self._catalogue, self._world, self._world.instances)
         self._robot = Robot(household, self._times)
         effects.settle(household, self._effect_config)
 
@@ -308,10 +311,10 @@ def _wrapped(angle_rad: float) -> float:
     return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
-def _build_kitchen(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> Stage:
+def _build_kitchen(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> Stage:
     from forestall.worlds.kitchen.model import build_scene
 
-    return build_scene(needs, seed, vocabulary)
+    return build_scene(needs, seed, catalogue)
 
 
 def _maker(renderer: str, frames: FrameMemory | None) -> MakeRenderer:

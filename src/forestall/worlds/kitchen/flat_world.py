@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from forestall.domain.model import Domain
 from forestall.errors import SceneError
 from forestall.types.facts import category_of
 from forestall.types.observation import Frame, Intrinsics, Vec3
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import Vocabulary
+from forestall.worlds.kitchen.catalogue import Catalogue
 from forestall.worlds.kitchen.environment import KitchenEnvironment
+from forestall.worlds.kitchen.needs import roomed
 
 REACH_M = 0.8
 SPEED_M_PER_S = 0.25
@@ -274,18 +276,18 @@ class FlatRenderer:
         return Frame(rgb, depth, self._intrinsics, camera_to_world.copy(), ids, names)
 
 
-def flat_environment(needs: SceneNeeds, vocabulary: Vocabulary) -> KitchenEnvironment:
+def flat_environment(needs: SceneNeeds, domain: Domain) -> KitchenEnvironment:
     """A whole environment without geometry: the true rules on a flat world."""
     return KitchenEnvironment(
         needs,
-        vocabulary,
+        domain,
         intrinsics=Intrinsics.from_vertical_fov(64, 48, 60.0),
         build=lambda n, seed, v: FlatWorld(flat_scene(n, seed, v)),
         make=lambda _, intrinsics: FlatRenderer(intrinsics),
     )
 
 
-def flat_scene(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> FlatScene:
+def flat_scene(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> FlatScene:
     """A scene with a room's fixtures and the needed objects, places drawn from the seed.
 
     Raises:
@@ -297,47 +299,47 @@ def flat_scene(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> FlatScen
         overrides.setdefault(name, {})[attribute] = value
     things = [
         FlatInstance(f"{c}-{k}", c, None, tuple(sorted(overrides.get(f"{c}-{k}", {}).items())))
-        for c, count in _ROOMS[needs.room].items()
+        for c, count in _ROOMS[roomed(needs).room].items()
         for k in range(1, count + 1)
     ]
     blocked: dict[str, str] = {}
     waiting = list(needs.objects)
     while waiting:
-        ready = [o for o in waiting if _placeable(o, things, vocabulary)]
+        ready = [o for o in waiting if _placeable(o, things, catalogue)]
         if not ready:
             raise SceneError(f"no place in the flat scene for {waiting[0].id}")
         need = ready[0]
         waiting.remove(need)
         if need.in_front_of is not None:
             blocked[need.in_front_of] = need.id
-        parents = _placeable(need, things, vocabulary)
+        parents = _placeable(need, things, catalogue)
         parent = parents[int(rng.integers(len(parents)))]
         things.append(FlatInstance(need.id, need.category, parent, need.states))
-    return FlatScene((*things, *_prepared(things, vocabulary)), blocked)
+    return FlatScene((*things, *_prepared(things, catalogue)), blocked)
 
 
-def _placeable(need: ObjectNeed, things: list[FlatInstance], vocabulary: Vocabulary) -> list[str]:
+def _placeable(need: ObjectNeed, things: list[FlatInstance], catalogue: Catalogue) -> list[str]:
     if need.in_front_of is not None:
         return [t.parent for t in things if t.name == need.in_front_of and t.parent is not None]
     wanted = need.places or ("CounterTop", "DiningTable")
     found = []
     for thing in things:
-        kind = vocabulary[thing.name].receptacle
+        kind = catalogue[thing.name].receptacle
         if kind is None or not {thing.name, category_of(thing.name)} & set(wanted):
             continue
         count = sum(1 for t in things if t.parent == thing.name)
-        if vocabulary.accepts(thing.name, need.category) and (
+        if catalogue.accepts(thing.name, need.category) and (
             kind.capacity is None or count < kind.capacity
         ):
             found.append(thing.name)
     return found
 
 
-def _prepared(things: Iterable[FlatInstance], vocabulary: Vocabulary) -> list[FlatInstance]:
+def _prepared(things: Iterable[FlatInstance], catalogue: Catalogue) -> list[FlatInstance]:
     numbers: dict[str, int] = {}
     made = []
     for thing in things:
-        category = vocabulary[thing.category]
+        category = catalogue[thing.category]
         for into, count in ((category.slices_into, category.slices), (category.cracks_into, 1)):
             for _ in range(count if into is not None else 0):
                 assert into is not None

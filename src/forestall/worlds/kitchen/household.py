@@ -2,7 +2,7 @@
 
 Skills and effects change it, the environment's oracle reads it. It tells the `World` to move things
 and to make states visible; it never asks it for a meaning. Everything about categories comes from
-the vocabulary.
+the catalogue.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from forestall.types.episode import Event
 from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Vec3
-from forestall.vocabulary import Category, Vocabulary
+from forestall.worlds.kitchen.catalogue import Catalogue, Category
 
 FLOOR = "Floor"
 """Category that takes what falls."""
@@ -37,7 +37,7 @@ class Placed(Protocol):
 
     @property
     def category(self) -> str:
-        """Category of the vocabulary."""
+        """Category of the catalogue."""
 
     @property
     def parent(self) -> str | None:
@@ -72,16 +72,16 @@ def natural_key(name: str) -> tuple[str, int, str]:
 
 
 class Household:
-    """Mutable truth over a vocabulary; one instance is one run of one scene.
+    """Mutable truth over a catalogue; one instance is one run of one scene.
 
     Args:
-        vocabulary: categories and their properties.
+        catalogue: categories and their properties.
         world: moves things and shows states.
         instances: everything in the scene, prepared things included.
     """
 
-    def __init__(self, vocabulary: Vocabulary, world: World, instances: Iterable[Placed]) -> None:
-        self.vocabulary = vocabulary
+    def __init__(self, catalogue: Catalogue, world: World, instances: Iterable[Placed]) -> None:
+        self.catalogue = catalogue
         self.world = world
         self.held: str | None = None
         self.time_s = 0.0
@@ -93,7 +93,7 @@ class Household:
         self._events: list[Event] = []
         self._tempered_s: dict[str, float] = {}
         for instance in sorted(instances, key=lambda i: natural_key(i.name)):
-            states = vocabulary.default_states(instance.category) | dict(instance.states)
+            states = catalogue.default_states(instance.category) | dict(instance.states)
             self._states[instance.name] = states
             if instance.prepared:
                 self._waiting.append(instance.name)
@@ -116,14 +116,14 @@ class Household:
 
     def is_any_support(self, name: str) -> bool:
         """Whether a name is a category of supports of which any will do ("CounterTop")."""
-        kind = self.vocabulary.find(name)
+        kind = self.catalogue.find(name)
         if kind is None or is_instance(name) or not kind.fixture or kind.receptacle is None:
             return False
         return kind.receptacle.relation == "on_top_of" and kind.receptacle.capacity is None
 
     def category(self, name: str) -> Category:
         """The category of an instance."""
-        return self.vocabulary[name]
+        return self.catalogue[name]
 
     def of_category(self, category: str) -> list[str]:
         """Every instance of a category that is there now."""
@@ -163,7 +163,7 @@ class Household:
 
     def is_shut(self, name: str) -> bool:
         """Whether a thing encloses its contents and is closed."""
-        return self.vocabulary.encloses(name) and self.state(name, "open") == "closed"
+        return self.catalogue.encloses(name) and self.state(name, "open") == "closed"
 
     # states
 
@@ -179,8 +179,8 @@ class Household:
         Raises:
             UnknownNameError: there is no such attribute, or it has no such value.
         """
-        if value not in self.vocabulary.values(attribute):
-            known = self.vocabulary.values(attribute)
+        if value not in self.catalogue.values(attribute):
+            known = self.catalogue.values(attribute)
             raise UnknownNameError(f"value of {attribute}", value, known)
         states = self._states.get(name, {})
         if attribute not in states:
@@ -245,7 +245,7 @@ class Household:
             self._parents[name] = None
             if parent is not None:
                 self._attach(name, parent)
-            for attribute in self.vocabulary.lasting:
+            for attribute in self.catalogue.lasting:
                 if attribute in states and attribute in self._states[name]:
                     self.set_state(name, attribute, states[attribute])
             if old in self._spoiled:
@@ -273,7 +273,7 @@ class Household:
         )
 
     def _relation(self, receptacle: str) -> str:
-        kind = self.vocabulary[receptacle].receptacle
+        kind = self.catalogue[receptacle].receptacle
         return "on_top_of" if kind is None else kind.relation
 
     # the oracle's view
@@ -309,7 +309,7 @@ class Household:
 
     def blocker(self, name: str) -> str | None:
         """What stands in front of a thing that could be picked up."""
-        if not self.vocabulary[name].pickupable or name == self.held or name not in self._parents:
+        if not self.catalogue[name].pickupable or name == self.held or name not in self._parents:
             return None
         blocker = self.world.blocker(name)
         return blocker if blocker in self._parents else None
@@ -319,7 +319,7 @@ class Household:
         box = None if corners is None else Box(*corners)
         return ObjectNode(
             id=name,
-            category=self.vocabulary[name].name,
+            category=self.catalogue[name].name,
             states=tuple(sorted(self._states[name].items())),
             centroid_m=None if box is None else box.centre,
             box_m=box,

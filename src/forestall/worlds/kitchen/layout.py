@@ -1,4 +1,4 @@
-"""The vocabulary of floor plans: furniture items, plans, and drafts that keep floor free.
+"""The catalogue of floor plans: furniture items, plans, and drafts that keep floor free.
 
 `plans` draws with it, the furniture builders read it; no simulator, only rectangles.
 

@@ -16,20 +16,21 @@ import numpy as np
 
 from forestall.errors import SceneError
 from forestall.types.facts import category_of, is_instance
-from forestall.types.scene import AXES, SceneNeeds
-from forestall.vocabulary import Vocabulary
+from forestall.types.scene import SceneNeeds
 from forestall.worlds.kitchen import layout, plans
 from forestall.worlds.kitchen.assembly import Kit, compile_kit
 from forestall.worlds.kitchen.bodies import Bodies
+from forestall.worlds.kitchen.catalogue import Catalogue
 from forestall.worlds.kitchen.changes import Change, change_of, disturb
 from forestall.worlds.kitchen.contents import Contents, Thing, contents_of
 from forestall.worlds.kitchen.forms import Instance, Rect
 from forestall.worlds.kitchen.navigation import Floor, Standing
+from forestall.worlds.kitchen.needs import AXES, roomed
 from forestall.worlds.kitchen.objects import build_thing
 from forestall.worlds.kitchen.robot import build_robot
 from forestall.worlds.kitchen.rooms import build_room
 from forestall.worlds.kitchen.settled import check_settled
-from forestall.worlds.kitchen.stocking import OPEN_PLACES, Stocker
+from forestall.worlds.kitchen.stocking import Stocker
 from forestall.worlds.kitchen.streams import Streams
 from forestall.worlds.kitchen.style import draw_light, draw_style
 from forestall.worlds.kitchen.world import HAND_M, KitchenWorld
@@ -47,36 +48,34 @@ STARTS = 40
 """How many other start places are tried."""
 
 
-def build_scene(needs: SceneNeeds, seed: int, vocabulary: Vocabulary) -> KitchenWorld:
+def build_scene(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> KitchenWorld:
     """Build the scene of a seed, the same each time.
 
     Args:
         needs: what must be there; everything else varies with the seed.
         seed: 0 or more.
-        vocabulary: categories, those of the task file included.
+        catalogue: categories, those of the task file included.
 
     Raises:
         SceneError: contradictory needs, or no room for something.
-        UnknownNameError: a category that the vocabulary lacks.
+        UnknownNameError: a category that the catalogue lacks.
     """
-    if needs.room not in OPEN_PLACES:
-        known = ", ".join(sorted(OPEN_PLACES))
-        raise SceneError(f"unknown room {needs.room!r}: known: {known}")
-    base = _canonical(needs.undisturbed or _undisturbed(needs), vocabulary)
-    needs = _canonical(needs, vocabulary)
+    needs = roomed(needs)
+    base = _canonical(needs.undisturbed or _undisturbed(needs), catalogue)
+    needs = _canonical(needs, catalogue)
     if base.room != needs.room:
         raise SceneError(f"a {base.room} cannot be changed into a {needs.room}")
-    change = change_of(needs, base, lambda n, a: vocabulary.default_states(n)[a])
+    change = change_of(needs, base, lambda n, a: catalogue.default_states(n)[a])
     failure = ""
     for attempt in range(LAYOUTS):
         streams = Streams(seed, attempt, dict(needs.vary))
-        contents = contents_of(needs, base, vocabulary, streams)
-        empty = _empty_room(needs, base, contents.things, vocabulary, streams)
+        contents = contents_of(needs, base, catalogue, streams)
+        empty = _empty_room(needs, base, contents.things, catalogue, streams)
         start = empty.world.bodies.snapshot()
         for stocking in range(STOCKINGS):
             empty.world.bodies.restore(start)
             try:
-                stocker = _stock(empty, base, vocabulary, contents, streams, stocking)
+                stocker = _stock(empty, base, catalogue, contents, streams, stocking)
                 _disturb(stocker, change, contents, streams, stocking)
                 world = _restarted(empty, streams)
             except SceneError as error:
@@ -99,30 +98,30 @@ class _Empty:
     floor: Floor
 
 
-def _canonical(needs: SceneNeeds, vocabulary: Vocabulary) -> SceneNeeds:
+def _canonical(needs: SceneNeeds, catalogue: Catalogue) -> SceneNeeds:
     """Resolve aliases and check what can be checked without a room."""
     ids = [n.id for n in needs.objects]
     twice = sorted({i for i in ids if ids.count(i) > 1})
     if twice:
         raise SceneError(f"{twice[0]} is needed twice; every object has its own id")
     for need in needs.objects:
-        category = vocabulary[need.category]
+        category = catalogue[need.category]
         if category.fixture:
             raise SceneError(f"{need.id}: a {category.name} is a fixture and cannot be placed")
         if category_of(need.id) != category.name or not is_instance(need.id):
             raise SceneError(f"{need.id} must be named {category.name}-1 or another number")
-        _checked(need.id, category.name, need.states, vocabulary)
+        _checked(need.id, category.name, need.states, catalogue)
         for place in need.places:
-            if vocabulary[place].receptacle is None:
+            if catalogue[place].receptacle is None:
                 raise SceneError(f"{need.id}: nothing can be put on or in a {place}")
         if need.in_front_of is not None and need.in_front_of not in ids:
             raise SceneError(
                 f"{need.id} is to stand in front of {need.in_front_of}, "
                 "which is not among the needed objects"
             )
-    fixtures = tuple((vocabulary.canonical(f), a, v) for f, a, v in needs.fixtures)
+    fixtures = tuple((catalogue.canonical(f), a, v) for f, a, v in needs.fixtures)
     for name, attribute, value in fixtures:
-        _checked(name, vocabulary[name].name, ((attribute, value),), vocabulary)
+        _checked(name, catalogue[name].name, ((attribute, value),), catalogue)
     low, high = needs.clutter
     if not 0 <= low <= high:
         raise SceneError(f"clutter must be a smallest and a largest number, got {low} and {high}")
@@ -136,14 +135,14 @@ def _canonical(needs: SceneNeeds, vocabulary: Vocabulary) -> SceneNeeds:
 
 
 def _checked(
-    name: str, category: str, states: Sequence[tuple[str, str]], vocabulary: Vocabulary
+    name: str, category: str, states: Sequence[tuple[str, str]], catalogue: Catalogue
 ) -> None:
     for attribute, value in states:
-        if attribute not in vocabulary[category].attributes:
-            known = ", ".join(vocabulary[category].attributes) or "none"
+        if attribute not in catalogue[category].attributes:
+            known = ", ".join(catalogue[category].attributes) or "none"
             raise SceneError(f"{name} has no attribute {attribute!r}: it has {known}")
-        if value not in vocabulary.values(attribute):
-            known = ", ".join(vocabulary.values(attribute))
+        if value not in catalogue.values(attribute):
+            known = ", ".join(catalogue.values(attribute))
             raise SceneError(f"{attribute} of {name} cannot be {value!r}: known: {known}")
 
 
@@ -151,7 +150,7 @@ def _empty_room(
     needs: SceneNeeds,
     base: SceneNeeds,
     things: Sequence[Thing],
-    vocabulary: Vocabulary,
+    catalogue: Catalogue,
     streams: Streams,
 ) -> _Empty:
     plan, start = _drawn(needs.room, streams)
@@ -159,7 +158,7 @@ def _empty_room(
     kit = Kit(mujoco.MjSpec(), colours)
     forms = build_room(kit, plan, draw_style(colours), draw_light(streams("light")))
     fixtures = tuple(sorted(forms))
-    states = {name: vocabulary.default_states(name) for name in fixtures}
+    states = {name: catalogue.default_states(name) for name in fixtures}
     for name, attribute, value in (*needs.fixtures, *base.fixtures):
         if name not in states:
             raise SceneError(f"the {needs.room} has no {name}")
@@ -167,7 +166,7 @@ def _empty_room(
             states[name][attribute] = value
     for thing in things:
         kit.rng = streams("colours", thing.looks)
-        forms[thing.name] = build_thing(kit, thing.name, vocabulary[thing.category])
+        forms[thing.name] = build_thing(kit, thing.name, catalogue[thing.category])
         states[thing.name] = thing.states
     build_robot(kit, HAND_M)
     bodies = Bodies(compile_kit(kit), forms, states)
@@ -212,7 +211,7 @@ def _decks(plan: layout.Plan) -> Mapping[str, str]:
 def _stock(
     empty: _Empty,
     base: SceneNeeds,
-    vocabulary: Vocabulary,
+    catalogue: Catalogue,
     contents: Contents,
     streams: Streams,
     stocking: int,
@@ -220,7 +219,7 @@ def _stock(
     """Furnish the undisturbed scene."""
     world = empty.world
     stocker = Stocker(
-        world, vocabulary, base.room, empty.fixtures, lambda n: streams("place", stocking, n)
+        world, catalogue, base.room, empty.fixtures, lambda n: streams("place", stocking, n)
     )
     stocker.put_needed(base.objects)
     placed = stocker.put_clutter(contents.clutter.names, contents.clutter.most)

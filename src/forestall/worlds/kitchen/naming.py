@@ -15,6 +15,7 @@ import difflib
 from typing import Protocol, runtime_checkable
 
 from forestall.types.facts import category_of, is_instance
+from forestall.worlds.kitchen.catalogue import spoken
 from forestall.worlds.kitchen.household import Household, natural_key
 
 
@@ -101,10 +102,10 @@ def _ease(household: Household, name: str) -> tuple[bool, bool, bool, tuple[str,
 
 def _candidates(household: Household, name: str) -> list[str]:
     """Every instance that a name can mean; refuses where there is none."""
-    wanted = household.vocabulary.canonical(name)
+    wanted = household.catalogue.canonical(name)
     if household.exists(wanted):
         return [wanted]
-    category = household.vocabulary.find(wanted)
+    category = household.catalogue.find(wanted)
     if category is None:
         raise RefusalError(f"nothing here is called {name!r}{_hint(household, wanted)}")
     became = household.gone(wanted)
@@ -117,7 +118,7 @@ def _candidates(household: Household, name: str) -> list[str]:
     if is_instance(wanted) and found:
         raise RefusalError(f"there is no {wanted} here; there is {', '.join(found)}")
     if not found:
-        raise RefusalError(f"there is no {category.words or category.name} here")
+        raise RefusalError(f"there is no {spoken(category.name)} here")
     return found
 
 

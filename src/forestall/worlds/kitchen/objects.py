@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from forestall.errors import InputError
-from forestall.vocabulary import Category
 from forestall.worlds.kitchen import crockery, food, meshes, plants
 from forestall.worlds.kitchen.assembly import Assembly, Kit
+from forestall.worlds.kitchen.catalogue import Category
 from forestall.worlds.kitchen.crockery import chosen, darker
 from forestall.worlds.kitchen.forms import Form, Rect, Region, Rgba
 

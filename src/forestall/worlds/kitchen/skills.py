@@ -4,7 +4,7 @@
 household and returns the outcome; the environment then lets the automatic effects settle
 (`effects`). A refusal names the object and the unmet need and changes nothing but the robot's own
 position. Every manipulation skill first drives to its target when that is out of reach. What a
-category is good for is read from the vocabulary.
+category is good for is read from the catalogue.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
 from forestall.worlds.kitchen import effects
+from forestall.worlds.kitchen.catalogue import spoken
 from forestall.worlds.kitchen.household import FLOOR, Household, number_of
 from forestall.worlds.kitchen.naming import (
     RefusalError,
@@ -160,7 +161,7 @@ def _need_takes(robot: Robot, name: str, place: str) -> None:
         raise RefusalError(f"nothing can be put on or into {place}")
     if name in home.ancestors(place):
         raise RefusalError(f"{name} cannot be put into itself")
-    if not home.vocabulary.accepts(place, name):
+    if not home.catalogue.accepts(place, name):
         raise RefusalError(f"{place} does not take {name}")
     robot.need_accessible(place)
     if home.is_shut(place):
@@ -210,7 +211,7 @@ def toggle_on(robot: Robot, target: str) -> str:
     if device is not None and device.needs_held is not None:
         held = home.held
         if held is None or home.category(held).name != device.needs_held:
-            words = home.vocabulary[device.needs_held].words
+            words = spoken(device.needs_held)
             raise RefusalError(f"{name} is turned on with the {words}, which is not in the gripper")
     if device is not None and device.needs_closed and home.state(name, "open") == "open":
         raise RefusalError(f"{name} cannot be turned on while it is open")
@@ -305,7 +306,7 @@ def _under_the_hand(robot: Robot, held: str, becomes: str) -> str | None:
         candidates = [*on_it, focus, *home.ancestors(focus)]
     for place in [*candidates, *home.of_category(FLOOR)]:
         if (
-            home.vocabulary.accepts(place, becomes)
+            home.catalogue.accepts(place, becomes)
             and home.closed_around(place) is None
             and not home.is_shut(place)
             and why_no_room(home, held, place) is None

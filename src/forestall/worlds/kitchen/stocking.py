@@ -14,7 +14,7 @@ import numpy as np
 from forestall.errors import SceneError
 from forestall.types.facts import category_of
 from forestall.types.scene import ObjectNeed
-from forestall.vocabulary import Vocabulary
+from forestall.worlds.kitchen.catalogue import Catalogue
 from forestall.worlds.kitchen.forms import Float, Pose, Region, inverse, pose_at
 from forestall.worlds.kitchen.placement import REST_M, Rules, Score, footprint_at
 from forestall.worlds.kitchen.world import KitchenWorld
@@ -36,7 +36,7 @@ class Stocker:
 
     Args:
         world: an empty room.
-        vocabulary: categories.
+        catalogue: categories.
         room: kind of the room.
         fixtures: instance names of the room's fixtures.
         stream: the random choices for a thing, by its name.
@@ -45,13 +45,13 @@ class Stocker:
     def __init__(
         self,
         world: KitchenWorld,
-        vocabulary: Vocabulary,
+        catalogue: Catalogue,
         room: str,
         fixtures: Sequence[str],
         stream: Callable[[str], np.random.Generator],
     ) -> None:
         self.world = world
-        self.vocabulary = vocabulary
+        self.catalogue = catalogue
         self.open_places = OPEN_PLACES[room]
         self.fixtures = sorted(fixtures)
         self.stream = stream
@@ -64,7 +64,7 @@ class Stocker:
             SceneError: an object finds no place.
         """
         blocked = {n.in_front_of: n for n in needs if n.in_front_of is not None}
-        for need in in_order(needs, self.vocabulary):
+        for need in in_order(needs, self.catalogue):
             if need.in_front_of is not None:
                 self.put_in_front(need)
             else:
@@ -109,14 +109,14 @@ class Stocker:
         Raises:
             SceneError: none exists, or none takes the object.
         """
-        wanted = tuple(self.vocabulary.canonical(p) for p in need.places) or self.open_places
+        wanted = tuple(self.catalogue.canonical(p) for p in need.places) or self.open_places
         there = [*self.fixtures, *self.needed]
         options = [n for n in there if n in wanted or category_of(n) in wanted]
         if not options:
             raise SceneError(
                 f"{need.id} needs {' or '.join(wanted)}, which the scene does not have"
             )
-        taking = [n for n in options if self.vocabulary.accepts(n, need.category)]
+        taking = [n for n in options if self.catalogue.accepts(n, need.category)]
         if not taking:
             raise SceneError(f"{need.id}: {' or '.join(wanted)} does not take a {need.category}")
         return [taking[int(i)] for i in rng.permutation(len(taking))]
@@ -218,7 +218,7 @@ class Stocker:
         if found is None or found[0].front_m is None:
             raise SceneError(f"nothing can stand in front of {behind} where it is")
         region, index = found
-        if not self.vocabulary.accepts(region.receptacle, need.category):
+        if not self.catalogue.accepts(region.receptacle, need.category):
             raise SceneError(f"{region.receptacle} does not take a {need.category}")
         local = self._before(need.id, behind, region, index)
         self.world.settle(need.id, region, index, local)
@@ -259,7 +259,7 @@ class Stocker:
             rules = Rules(gap_m=0.05, spare=frozenset(self.needed), clear=False)
             for index in rng.permutation(len(surfaces)):
                 receptacle = surfaces[int(index)]
-                if not self.vocabulary.accepts(receptacle, name):
+                if not self.catalogue.accepts(receptacle, name):
                     continue
                 found = self.world.find_spot(
                     name,
@@ -303,14 +303,14 @@ def _turns(size: tuple[float, float], rng: np.random.Generator) -> tuple[float, 
     return (float(np.clip(turn, -0.4, 0.4)), 0.0)
 
 
-def in_order(needs: Sequence[ObjectNeed], vocabulary: Vocabulary) -> list[ObjectNeed]:
+def in_order(needs: Sequence[ObjectNeed], catalogue: Catalogue) -> list[ObjectNeed]:
     """Receptacles before their contents, blocked things before their blockers.
 
     Raises:
         SceneError: the needs go round in a circle.
     """
     by_id = {n.id: n for n in needs}
-    waits: Mapping[str, set[str]] = {n.id: _depends(n, needs, vocabulary) for n in needs}
+    waits: Mapping[str, set[str]] = {n.id: _depends(n, needs, catalogue) for n in needs}
     done: list[ObjectNeed] = []
     placed: set[str] = set()
     blocked = {n.in_front_of for n in needs}
@@ -329,8 +329,8 @@ def in_order(needs: Sequence[ObjectNeed], vocabulary: Vocabulary) -> list[Object
     return done
 
 
-def _depends(need: ObjectNeed, needs: Sequence[ObjectNeed], vocabulary: Vocabulary) -> set[str]:
-    wanted = {vocabulary.canonical(p) for p in need.places}
+def _depends(need: ObjectNeed, needs: Sequence[ObjectNeed], catalogue: Catalogue) -> set[str]:
+    wanted = {catalogue.canonical(p) for p in need.places}
     found = {n.id for n in needs if n.id != need.id and (n.id in wanted or n.category in wanted)}
     if need.in_front_of is not None and any(n.id == need.in_front_of for n in needs):
         found.add(need.in_front_of)

@@ -1,0 +1,107 @@
+"""Which instance a category name in a plan means, from what the robot has seen.
+
+Used by the monitor before each subtask. It reads the fused scene graph and never a simulator. A
+name that fits nothing observed stays a category name: the environment then resolves it, as a robot
+would that opens a fridge to look for "the egg".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from forestall.domain.formula import literals
+from forestall.domain.model import Domain, Skill
+from forestall.domain.truth import view
+from forestall.types.facts import Literal, Truth, is_instance
+from forestall.types.graph import ObjectNode, SceneGraph
+from forestall.types.observation import Vec3
+from forestall.types.plan import Subtask
+
+
+def ground_subtask(
+    subtask: Subtask,
+    graph: SceneGraph,
+    domain: Domain,
+    robot_world_m: Vec3,
+    bound: Mapping[str, str],
+) -> Subtask:
+    """Replace category names by instance names.
+
+    An instance name stays. Otherwise, in this order: the held object when it is of the category
+    (for a placed or poured object); the instance that the category was bound to before; the
+    nearest located one that nothing shuts in or blocks, ties by name.
+
+    Args:
+        subtask: as the plan has it.
+        graph: the whole fused graph.
+        domain: what names and skills mean.
+        robot_world_m: where the robot stands.
+        bound: category → instance, from earlier subtasks of the same episode.
+    """
+    skill = domain.skill(subtask.skill)
+    names = []
+    for parameter, raw in zip(skill.parameters, subtask.args, strict=True):
+        name = domain.canonical(raw)
+        if is_instance(name) or domain.find(name) is None:
+            names.append(name)
+            continue
+        category = domain[name].name
+        nodes = graph.of_category(category)
+        held = graph.get(graph.holding) if graph.holding else None
+        places = parameter.name == skill.hand or _may_be_in_hand(skill, domain)
+        if held is not None and held.category == category and (places or len(nodes) == 1):
+            names.append(held.id)
+        elif bound.get(category) in {n.id for n in nodes} and not domain.is_open_support(category):
+            names.append(bound[category])
+        else:
+            names.append(_nearest(nodes, graph, domain, robot_world_m) or category)
+    return Subtask(subtask.skill, tuple(names))
+
+
+def executable(subtask: Subtask, planned: Subtask, domain: Domain) -> Subtask:
+    """The subtask to send to the robot: grounded, but open supports as the plan names them.
+
+    "On a counter" leaves it to the robot's controller which counter has room.
+    """
+    return Subtask(
+        subtask.skill,
+        tuple(
+            raw if domain.is_open_support(raw) and not is_instance(raw) else name
+            for name, raw in zip(subtask.args, planned.args, strict=True)
+        ),
+    )
+
+
+def _may_be_in_hand(skill: Skill, domain: Domain) -> bool:
+    """Whether a skill can be about what is held already: it neither drives nor fills the hand."""
+    roles = domain.roles
+    if skill.drives or skill.hand is not None:
+        return False
+    wants_empty = any(
+        x.predicate == roles.hand_empty or (x.predicate == roles.holding and not positive)
+        for need in skill.needs
+        for x, positive in literals(need.formula)
+    )
+    return not wants_empty
+
+
+def _nearest(
+    nodes: tuple[ObjectNode, ...], graph: SceneGraph, domain: Domain, robot_world_m: Vec3
+) -> str | None:
+    """The located one that nothing shuts in or blocks; of several the nearest, then by name."""
+    seen = view(graph, domain)
+
+    def fails(predicate: str | None, name: str) -> bool:
+        return predicate is not None and seen.truth(Literal(predicate, (name,))) is not Truth.TRUE
+
+    def key(node: ObjectNode) -> tuple[bool, bool, bool, float, str]:
+        shut_in = fails(domain.roles.accessible, node.id)
+        blocked = fails(domain.roles.unblocked, node.id)
+        if node.centroid_m is None:
+            return (True, shut_in, blocked, 0.0, node.id)
+        gap = math.dist(node.centroid_m[:2], robot_world_m[:2])
+        return (False, shut_in, blocked, round(gap, 3), node.id)
+
+    best = min(nodes, key=key, default=None)
+    return None if best is None else best.id
