@@ -35,6 +35,7 @@ from forestall.seams import (
 )
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
+from forestall.types.observation import Observation
 from forestall.vocabulary import Vocabulary
 
 STATES = "learned"
@@ -240,7 +241,7 @@ def make_viewer(
     captioner = make_captioner(config.captioner, vocabulary)
 
     def view(boundary: BoundaryRecord) -> View | None:
-        if boundary.observation is None:
+        if not isinstance(boundary.observation, Observation):
             return None
         return view_of(boundary.observation, boundary.scoped, encoder, captioner)
 
