@@ -157,7 +157,8 @@ class Runtime:
         while not monitor.exhausted:
             if monitor.finished:
                 decision = self._finish(episode)
-                if decision.outcome not in (Outcome.REPLAN, Outcome.HOLD):
+                goes_on = decision.outcome is Outcome.REPLAN
+                if not goes_on and decision.hold is not Hold.REPLAN_LIMIT:
                     return EpisodeEnd.PLAN_FINISHED
             else:
                 decision = self._before(episode)
