@@ -107,7 +107,7 @@ class Monitor:
             why = f"{len(run.executed)} subtasks were executed, and no more may be"
             limit = Hold.SUBTASK_LIMIT
             return MonitorDecision(Outcome.HOLD, False, run.ground(), hold=limit, why=why)
-        self._awaited = None
+        self._awaited, run.ready = None, False
         return self._judge(
             When.BEFORE, run.position, None, observation, self._strategy.before_subtask
         )
