@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from forestall.conclusion import MonitorConfig
 from forestall.errors import ForestallError
 from forestall.monitor import Monitor
+from forestall.records.plain import plain
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.episode import BoundaryRecord, EpisodeEnd, EpisodeRecord
 from forestall.types.observation import Observation
@@ -142,7 +143,10 @@ class Runtime:
             simulated_s=episode.time_s,
             compute_s=monitor.seconds,
             final=monitor.final,
-            provenance=(*provenance, ("perception", dict(self._perceiver.describe()))),
+            provenance=tuple(
+                (name, plain(value))
+                for name, value in (*provenance, ("perception", self._perceiver.describe()))
+            ),
         )
         if score is not None and broken is None:
             record = score(record)

@@ -22,7 +22,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.runtime import When
 from forestall.types.verdict import Replan, ReplanOutcome
 
-from . import records
+from report import records
 
 KEYS = {
     "kind": str,
