@@ -46,7 +46,7 @@ LOOK = StrategyAnswer(Decision.LOOK_AGAIN, replace(ALARM, decision=Decision.LOOK
 
 def node(name: str, x: float = 0.0) -> ObjectNode:
     box = Box((x - 0.1, -0.1, 0.8), (x + 0.1, 0.1, 1.0))
-    return ObjectNode(name, name.split("-")[0], centroid_m=box.centre, box_m=box)
+    return ObjectNode(name, name.split("-", maxsplit=1)[0], centroid_m=box.centre, box_m=box)
 
 
 def scene(held: str | None = None) -> SceneGraph:

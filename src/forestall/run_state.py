@@ -77,9 +77,7 @@ class RunState:
     def ground(self) -> Subtask:
         """The next subtask with instance names where they are known."""
         planned = self.plan.subtasks[self.position]
-        return ground_subtask(
-            planned, self.graph, self.vocabulary, self.robot_world_m, self.bound
-        )
+        return ground_subtask(planned, self.graph, self.vocabulary, self.robot_world_m, self.bound)
 
     def command(self, subtask: Subtask, position: int) -> Subtask:
         """What to send to the robot for a grounded subtask of the plan."""

@@ -14,7 +14,6 @@ from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import When
 from forestall.types.verdict import Decision
-
 from report import records
 
 

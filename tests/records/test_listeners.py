@@ -9,7 +9,6 @@ from rich.console import Console
 from forestall.records.listeners import ProgressLine
 from forestall.types.decision import Outcome
 from forestall.types.episode import EpisodeRecord, ExecutedRecord, SkillOutcome, SkillStatus
-
 from report import records
 
 

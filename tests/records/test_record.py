@@ -1,14 +1,18 @@
+"""The folder of a run: written as it happens, read back, and everything that can be wrong in it."""
+
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
 
 from forestall.errors import FileFormatError, InputError
-from forestall.records.as_json import RECORD_FORMAT, plain, record_json
+from forestall.records.codec import RECORD_FORMAT, record_to_json
+from forestall.records.derived import alarms, replans
 from forestall.records.record import (
     LINES_NAME,
     RECORD_NAME,
@@ -16,153 +20,29 @@ from forestall.records.record import (
     read_record,
     write_record,
 )
-from forestall.seams import Listener
-from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillOutcome, SkillStatus
-from forestall.types.graph import SceneGraph
-from forestall.types.runtime import When
-from forestall.types.verdict import Replan, ReplanOutcome
-
+from forestall.types.episode import EpisodeEnd, EpisodeRecord, StoredObservation
 from report import records
 
-KEYS = {
-    "kind": str,
-    "format": int,
-    "complete": bool,
-    "task": str,
-    "scenario": str,
-    "strategy": str,
-    "seed": int,
-    "success": bool,
-    "weak_success": bool,
-    "failures": list,
-    "alarms": list,
-    "replans": int,
-    "initial_plan": list,
-    "executed": list,
-    "end": str,
-    "simulated_s": float,
-    "compute_s": dict,
-    "computed_s": float,
-    "reasoning_s": float,
-    "total_s": float,
-    "perception": dict,
-    "memory": dict,
-    "versions": dict,
-    "page": str,
-    "boundaries": list,
-}
 
-
-def as_json(record: EpisodeRecord) -> dict[str, object]:
-    return json.loads(json.dumps(record_json(record, page="p.html", images={}), allow_nan=False))
-
-
-def test_every_key_is_there_with_its_type() -> None:
-    data = record_json(records.potato_record(), page="index.html", images={0: "images/a.jpg"})
-    assert {k: type(data[k]) for k in KEYS} == KEYS
-    assert data["boundaries"][0]["image"] == "images/a.jpg"
-    assert data["boundaries"][1]["image"] is None
-    assert json.loads(json.dumps(data, allow_nan=False)) == data
-
-
-def test_the_alarm_says_what_where_and_why() -> None:
-    data = record_json(records.potato_record(), page=None, images={})
-    assert data["alarms"] == [
-        {
-            "position": records.ALARM_INDEX,
-            "index": records.ALARM_INDEX,
-            "when": "before",
-            "subtask": "pick_up(Plate-1)",
-            "score": 0.734,
-            "threshold": 0.9,
-            "cause": records.CAUSE,
-            "must_change": ["vacant(Microwave-1)"],
-            "culprits": ["Bowl-1"],
-            "replanned": True,
-            "outcome": "solved",
-        }
-    ]
-    assert data["replans"] == 1
-    assert data["executed"][0] == {
-        "index": 0,
-        "subtask": "navigate_to_obj(Potato)",
-        "status": "succeeded",
-        "reason": "",
-        "duration_s": 4.0,
-    }
-
-
-def test_times_add_up_without_the_simulators_own() -> None:
-    record = records.potato_record()
-    record = replace(record, compute_s=(*record.compute_s, ("observe", 3.0), ("act", 1.0)))
-    data = record_json(record, page=None, images={})
-    assert data["reasoning_s"] == pytest.approx(2.785)
-    assert data["computed_s"] == pytest.approx(6.785)
-    assert data["total_s"] == pytest.approx(52.0 + 2.785)
-
-
-def test_a_dismissed_alarm_is_an_alarm_and_its_cause_says_so() -> None:
-    first, second = as_json(records.troubled_record())["alarms"]
-    assert first["cause"] == "nothing was found that must change: the difference is harmless"
-    assert (first["replanned"], first["outcome"]) == (False, "nothing to change")
-    assert (second["replanned"], second["outcome"]) == (False, "unsolvable")
-
-
-def test_an_alarm_without_a_diagnosis_is_kept() -> None:
-    record = records.potato_record()
-    bare = replace(record.boundaries[7], diagnosis=None, replan=None)
-    (alarm,) = as_json(replace(record, boundaries=(bare,)))["alarms"]
-    assert alarm["cause"] == "no diagnosis was made"
-    assert alarm["outcome"] is None
-
-
-def test_a_plan_that_was_not_adopted_is_no_replan() -> None:
-    record = records.potato_record()
-    alarm = record.boundaries[7]
-    went_on = replace(record.executed[7], subtask=alarm.subtask, index=alarm.index)
-    over_the_limit = replace(record, executed=(*record.executed[:7], went_on))
-    data = as_json(over_the_limit)
-    assert data["replans"] == 0
-    assert data["alarms"][0]["replanned"] is False
-    rejected = Replan(ReplanOutcome.REJECTED, alarm.replan.plan if alarm.replan else None)
-    changed = (*record.boundaries[:7], replace(alarm, replan=rejected))
-    assert as_json(replace(record, boundaries=changed))["replans"] == 0
-
-
-def test_boundaries_carry_graphs_verdict_and_plans() -> None:
-    boundary = as_json(records.potato_record())["boundaries"][7]
-    assert SceneGraph.from_json(boundary["scoped"]) == records.potato_record().boundaries[7].scoped
-    assert SceneGraph.from_json(boundary["verdict"]["nearest"]["graph"]).get("Book-1") is not None
-    assert boundary["verdict"]["parts"]["edge"] == 0.5
-    assert boundary["verdict"]["discrepancies"][0]["change"] == "extra object"
-    assert boundary["diagnosis"]["must_change"] == ["vacant(Microwave-1)"]
-    assert boundary["plan_before"] == list(records.NOMINAL[7:])
-    assert boundary["plan_after"][:2] == list(records.INSERTED)
-    assert boundary["mark"] == "alarm, replanned"
-    following = as_json(records.potato_record())["boundaries"][9]
-    assert following["plan_before"][0] == records.INSERTED[1]
-    assert following["plan_after"] is None
-
-
-def test_plain_knows_numpy_and_refuses_no_value() -> None:
-    assert plain({"a": np.float64(1.5), 2: (np.int32(3), float("nan")), "p": Path("a/b")}) == {
-        "a": 1.5,
-        "2": [3, None],
-        "p": "a/b",
-    }
-    assert plain({"b", "a"}) == ["a", "b"]
-    assert plain(EpisodeEnd.STOPPED) == "stopped safely"
-    assert plain(np.zeros(2)) == [0.0, 0.0]
+def unseen(record: EpisodeRecord) -> EpisodeRecord:
+    """The record without its observations: arrays do not compare."""
+    return replace(
+        record, boundaries=tuple(replace(b, observation=None) for b in record.boundaries)
+    )
 
 
 def test_write_and_read_again(tmp_path: Path) -> None:
     record = records.potato_record()
     path = write_record(tmp_path / "run", record, page="index.html")
-    data = read_record(path)
-    assert data == read_record(path.parent)
-    assert data["page"] == "index.html"
-    for boundary in data["boundaries"]:
-        assert (path.parent / boundary["image"]).read_bytes()[:2] == b"\xff\xd8"
+    found = read_record(path)
+    assert found == read_record(path.parent)
+    assert json.loads(path.read_text("utf-8"))["page"] == "index.html"
+    for boundary in found.boundaries:
+        assert isinstance(boundary.observation, StoredObservation)
+        for frame in boundary.observation.frames:
+            assert frame.picture is not None
+            assert (path.parent / frame.picture).read_bytes()[:2] == b"\xff\xd8"
+    assert unseen(found) == unseen(record)
     again = write_record(tmp_path / "again", record, page="index.html")
     assert path.read_bytes() == again.read_bytes()
     assert not [p for p in path.parent.iterdir() if p.name.startswith(".")]
@@ -173,7 +53,10 @@ def test_write_and_read_again(tmp_path: Path) -> None:
     [records.unjudged_record, records.troubled_record, records.empty_record],
 )
 def test_odd_runs_are_written_too(tmp_path: Path, make: object) -> None:
-    data = read_record(write_record(tmp_path, make()))  # type: ignore[operator]
+    record = make()  # type: ignore[operator]
+    path = write_record(tmp_path, record)
+    assert unseen(read_record(path)) == unseen(record)
+    data = json.loads(path.read_text("utf-8"))
     assert data["perception"].keys() >= {"segmenter", "state_estimator"}
     assert data["complete"] is True
 
@@ -186,7 +69,8 @@ def test_odd_runs_are_written_too(tmp_path: Path, make: object) -> None:
         ("[]", "not the record of a run"),
         ('{"format": 1, "nodes": []}', "not the record of a run"),
         (json.dumps({"kind": "episode", "format": RECORD_FORMAT + 1}), "this version reads"),
-        (json.dumps({"kind": "episode", "format": RECORD_FORMAT}), "lacks alarms"),
+        (json.dumps({"kind": "episode", "format": 1}), "this version reads 2"),
+        (json.dumps({"kind": "episode", "format": RECORD_FORMAT}), "lacks task"),
     ],
 )
 def test_a_file_that_is_no_record(tmp_path: Path, text: str, says: str) -> None:
@@ -205,17 +89,7 @@ def test_no_file_and_no_text(tmp_path: Path) -> None:
         read_record(tmp_path)
 
 
-def run_until(recorder: Listener, record: EpisodeRecord, boundaries: int) -> None:
-    recorder.on_start(record.task, record.initial_plan, record.seed)
-    executed = {e.index: e for e in record.executed}
-    for context, answer in records.calls(record)[:boundaries]:
-        recorder.on_boundary(context, answer)
-        if context.when is When.BEFORE and context.done in executed:
-            step = executed[context.done]
-            recorder.on_executed(step.subtask, step.outcome, 4.0 * step.index + 4)
-
-
-def test_a_killed_run_can_be_read(tmp_path: Path) -> None:
+def test_a_killed_run_reads_back_as_far_as_it_came(tmp_path: Path) -> None:
     record = records.potato_record()
     recorder = RunRecorder(
         tmp_path,
@@ -223,43 +97,56 @@ def test_a_killed_run_can_be_read(tmp_path: Path) -> None:
         strategy="proactive",
         provenance=dict(record.provenance),
     )
-    run_until(recorder, record, 9)
-    data = read_record(tmp_path)
-    assert data["complete"] is False
-    assert (data["end"], data["success"]) == (None, None)
-    assert (data["task"], data["scenario"], data["strategy"]) == (
-        "heat-potato",
-        "microwave-occupied",
-        "proactive",
+    records.follow(recorder, record, 9)
+    found = read_record(tmp_path)
+    assert (found.end, found.success, found.final) == (EpisodeEnd.UNFINISHED, None, None)
+    assert unseen(found) == replace(
+        unseen(record),
+        boundaries=unseen(record).boundaries[:9],
+        executed=record.executed[:8],
+        end=EpisodeEnd.UNFINISHED,
+        success=None,
+        weak_success=None,
+        events=(),
+        simulated_s=36.0,
+        compute_s=record.boundaries[8].compute_s,
     )
-    assert len(data["boundaries"]) == 9
-    assert [a["cause"] for a in data["alarms"]] == [records.CAUSE]
-    assert [e["index"] for e in data["executed"]] == [0, 1, 2, 3, 4, 5, 6, 8]
-    assert data["perception"]["state_estimator"] == "oracle"
-    assert data["replans"] == 1
+    assert [a.cause for a in alarms(found)] == [records.CAUSE]
+    assert replans(found) == 1
+    data = record_to_json(found)
+    assert (data["complete"], data["end"]) == (False, None)
     assert (tmp_path / data["boundaries"][3]["image"]).exists()
-    whole = record_json(record, page=None, images={})
-    assert data.keys() == whole.keys()
-    assert data["boundaries"][7]["scoped"] == json.loads(
-        json.dumps(whole["boundaries"][7]["scoped"])
-    )
+    assert data.keys() == record_to_json(record).keys()
+
+
+@pytest.mark.parametrize("boundaries", [1, 4, 9])
+def test_a_killed_run_has_the_seconds_that_the_whole_one_had_then(
+    tmp_path: Path, boundaries: int
+) -> None:
+    record = records.potato_record()
+    records.follow(RunRecorder(tmp_path), record, boundaries)
+    killed = read_record(tmp_path)
+    assert killed.compute_s == record.boundaries[boundaries - 1].compute_s
+    assert [b.seconds for b in killed.boundaries] == [
+        b.seconds for b in record.boundaries[:boundaries]
+    ]
 
 
 @pytest.mark.parametrize("cut", [1, 40, "inside a character"])
 def test_a_line_that_was_being_written_is_left_out(tmp_path: Path, cut: int | str) -> None:
-    run_until(RunRecorder(tmp_path), records.troubled_record(), 2)
+    records.follow(RunRecorder(tmp_path), records.troubled_record(), 2)
     lines = tmp_path / LINES_NAME
     whole = read_record(lines)
     head, last = lines.read_bytes().rstrip(b"\n").rsplit(b"\n", 1)
     size = cut if isinstance(cut, int) else last.index("熱".encode()) + 1
     lines.write_bytes(head + b"\n" + last[:size])
-    data = read_record(tmp_path)
-    assert len(data["boundaries"]) == len(whole["boundaries"])
-    assert len(data["executed"]) == len(whole["executed"]) - 1
+    found = read_record(tmp_path)
+    assert found.boundaries == whole.boundaries
+    assert found.executed == whole.executed[:-1]
 
 
 def test_damage_in_the_middle_is_told_with_its_line(tmp_path: Path) -> None:
-    run_until(RunRecorder(tmp_path), records.potato_record(), 3)
+    records.follow(RunRecorder(tmp_path), records.potato_record(), 3)
     lines = tmp_path / LINES_NAME
     rows = lines.read_text(encoding="utf-8").split("\n")
     lines.write_text("\n".join([rows[0], rows[1][:50], *rows[2:]]), encoding="utf-8")
@@ -273,12 +160,10 @@ def test_damage_in_the_middle_is_told_with_its_line(tmp_path: Path) -> None:
 def test_the_recorder_finishes_with_the_whole_record(tmp_path: Path) -> None:
     record = records.potato_record()
     recorder = RunRecorder(tmp_path, page="index.html")
-    run_until(recorder, record, 99)
+    records.follow(recorder, record, 99)
     pictures = sorted((tmp_path / "images").iterdir())
     recorder.on_end(record)
-    data = read_record(tmp_path)
-    assert data["complete"] is True
-    assert data["page"] == "index.html"
+    assert unseen(read_record(tmp_path)) == unseen(record)
     assert sorted((tmp_path / "images").iterdir()) == pictures
     assert json.loads((tmp_path / LINES_NAME).read_text("utf-8").splitlines()[-1]) == {
         "event": "end",
@@ -286,21 +171,32 @@ def test_the_recorder_finishes_with_the_whole_record(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("make", [records.potato_record, records.looked_after_record])
+def test_lines_and_record_say_the_same_of_a_boundary(tmp_path: Path, make: object) -> None:
+    record = make()  # type: ignore[operator]
+    records.follow(RunRecorder(tmp_path), record)
+    whole = json.loads((tmp_path / RECORD_NAME).read_text("utf-8"))["boundaries"]
+    rows = [json.loads(r) for r in (tmp_path / LINES_NAME).read_text("utf-8").splitlines()]
+    lines = [r["boundary"] for r in rows if r["event"] == "boundary"]
+    assert [{**b, "mark": None} for b in whole] == lines
+    (tmp_path / RECORD_NAME).unlink()
+    assert read_record(tmp_path).boundaries == read_record(tmp_path / LINES_NAME).boundaries
+
+
 def test_a_second_run_in_the_same_folder_replaces_the_first(tmp_path: Path) -> None:
     record = records.potato_record()
     recorder = RunRecorder(tmp_path)
     recorder.on_start(record.task, record.initial_plan, 1)
     recorder.on_end(record)
-    run_until(recorder, record, 2)
-    data = read_record(tmp_path)
-    assert data["complete"] is False
-    assert len(data["boundaries"]) == 2
+    records.follow(recorder, record, 2)
+    found = read_record(tmp_path)
+    assert found.end is EpisodeEnd.UNFINISHED
+    assert len(found.boundaries) == 2
 
 
 def test_a_recorder_must_be_started(tmp_path: Path) -> None:
-    outcome = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)
     with pytest.raises(InputError, match="on_start"):
-        RunRecorder(tmp_path).on_executed(records.potato_record().executed[0].subtask, outcome, 1.0)
+        RunRecorder(tmp_path).on_executed(records.potato_record().executed[0], 1.0)
 
 
 def test_a_failed_write_leaves_the_old_record(
@@ -319,26 +215,82 @@ def test_a_failed_write_leaves_the_old_record(
     assert [p.name for p in tmp_path.iterdir()] == [RECORD_NAME]
 
 
-def test_moments_after_and_at_the_end_are_told_apart(tmp_path: Path) -> None:
-    record = records.looked_after_record()
-    data = record_json(record, page=None, images={})
-    assert [b["when"] for b in data["boundaries"]] == ["before", "after"] * 15 + ["end"]
-    (alarm,) = data["alarms"]
-    assert (alarm["when"], alarm["index"], alarm["position"]) == ("after", 8, 17)
-    assert alarm["replanned"] is True
-    assert data["replans"] == 1
-    assert data["final"] == data["boundaries"][-1]["graph"]
-    assert [(w["detector"], w["score"]) for w in data["boundaries"][-1]["watched"]] == [
-        ("scene_graph", 0.962),
-        ("b", 0.734),
-    ]
-    after = data["boundaries"][17]
-    assert after["plan_before"] == list(records.NOMINAL[9:])
-    assert data["boundaries"][18]["plan_before"][0] == records.INSERTED[0]
-    recorder = RunRecorder(tmp_path)
-    run_until(recorder, record, 99)
-    killed = read_record(tmp_path)
-    for key in ("when", "index", "subtask", "plan_before", "plan_after", "watched"):
-        assert [b[key] for b in killed["boundaries"]] == [b[key] for b in data["boundaries"]], key
-    assert [e["index"] for e in killed["executed"]] == [e["index"] for e in data["executed"]]
-    assert killed["final"] is None
+Edit = Callable[[dict[str, Any]], object]
+
+
+@pytest.mark.parametrize(
+    ("edit", "place"),
+    [
+        (lambda d: d["boundaries"][3].pop("seconds"), r"boundaries\[3\] lacks 'seconds'"),
+        (lambda d: d["boundaries"][3].update(looks="two"), r"boundaries\[3\].looks: a whole"),
+        (lambda d: d["boundaries"][3].update(when="later"), r"boundaries\[3\].when: one of"),
+        (lambda d: d.update(boundaries={}), "boundaries: a list"),
+        (lambda d: d.update(boundaries=[None]), r"boundaries\[0\]: an object"),
+        (lambda d: d["boundaries"][0].update(graph=[]), r"boundaries\[0\].graph"),
+        (lambda d: d["boundaries"][0]["graph"].update(nodes=7), r"boundaries\[0\].graph"),
+        (lambda d: d["boundaries"][7]["verdict"].update(score="high"), "verdict.score: a number"),
+        (lambda d: d["boundaries"][7]["verdict"].update(threshold=10**400), "threshold: a number"),
+        (lambda d: d["boundaries"][7]["verdict"]["matches"].append(["a"]), "a pair"),
+        (lambda d: d["boundaries"][7]["diagnosis"].update(must_change=["?"]), "as a fact"),
+        (lambda d: d["boundaries"][7]["replan"].update(plan=["fly(Mug)"]), "unknown skill"),
+        (lambda d: d["boundaries"][0]["observation"].update(cameras=[]), "at least one camera"),
+        (
+            lambda d: d["boundaries"][0]["observation"]["cameras"][0].update(picture="../../x"),
+            "inside the folder",
+        ),
+        (lambda d: d["executed"][0].update(index=-1), r"executed\[0\].index"),
+        (lambda d: d["executed"][0].update(status="fine"), r"executed\[0\].status"),
+        (lambda d: d.update(seed=True), "seed: a whole"),
+        (lambda d: d.update(success="yes"), "success: true or false"),
+        (lambda d: d.update(goal=None), "goal: an object"),
+        (lambda d: d.update(scene={"room": "kitchen"}), "scene lacks"),
+        (lambda d: d.update(compute_s={"perceive": None}), "compute_s.perceive: a number"),
+        (lambda d: d.update(end="because"), "end: one of"),
+    ],
+)
+def test_a_broken_value_is_told_with_file_and_place(tmp_path: Path, edit: Edit, place: str) -> None:
+    path = write_record(tmp_path, records.potato_record())
+    data = json.loads(path.read_text("utf-8"))
+    edit(data)
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FileFormatError, match=place) as caught:
+        read_record(tmp_path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[" * 100_000, "nests too deeply"),
+        ('{"kind": "episode", "format": 2, "x": ' + "[" * 90 + "]" * 90 + "}", "nests more than"),
+        ('{"kind": "episode", "format": NaN}', "no number"),
+        ('{"kind": "episode", "format": ' + "9" * 5000 + "}", "damaged"),
+        ('{"kind": "episode", "format": 2, "task": "\\ud800"}', "half of a character"),
+    ],
+)
+def test_json_that_no_record_is(tmp_path: Path, text: str, says: str) -> None:
+    for name, content in ((RECORD_NAME, text), (LINES_NAME, text + "\n{}\n")):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+        with pytest.raises(FileFormatError, match=says):
+            read_record(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("[]", "line 2: an object"),
+        ("{}", "line 2 lacks 'event'"),
+        ('{"event": "boundary"}', "line 2 lacks 'boundary'"),
+        ('{"event": "boundary", "boundary": {"time_s": 1.0}}', "lacks 'compute_s'"),
+        ('{"event": "executed", "time_s": "now", "executed": {}}', "line 2.time_s: a number"),
+        ('{"event": "executed", "time_s": 1.0, "executed": {}}', r"executed\[0\] lacks 'status'"),
+    ],
+)
+def test_a_broken_line_is_told_with_file_and_place(tmp_path: Path, line: str, says: str) -> None:
+    records.follow(RunRecorder(tmp_path), records.potato_record(), 1)
+    path = tmp_path / LINES_NAME
+    first = path.read_text("utf-8").split("\n")[0]
+    path.write_text(f"{first}\n{line}\n", encoding="utf-8")
+    with pytest.raises(FileFormatError, match=says) as caught:
+        read_record(tmp_path)
+    assert str(path) in str(caught.value)

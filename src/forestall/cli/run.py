@@ -62,8 +62,8 @@ def run(
         quiet: no progress on standard error.
     """
     from forestall.build import RunConfig, prepare, provenance, run_episode
-    from forestall.records.listeners import ProgressLine
     from forestall.records.codec import record_to_json
+    from forestall.records.listeners import ProgressLine
     from forestall.records.record import RunRecorder, read_record
     from forestall.report.page import write_page
 

@@ -175,9 +175,7 @@ def alarm_json(alarm: Alarm) -> dict[str, Any]:
 
 def _boundaries(record: EpisodeRecord) -> list[dict[str, Any]]:
     return [
-        boundary_json(
-            m.boundary, position=m.position, mark=m.mark, before=m.before, after=m.after
-        )
+        boundary_json(m.boundary, position=m.position, mark=m.mark, before=m.before, after=m.after)
         for m in sorted(moments(record), key=lambda m: m.position or 0)
         if m.boundary is not None and m.position is not None
     ]

@@ -30,7 +30,7 @@ from forestall.records.derived import alarm_at, new_plan
 from forestall.records.fields import Field, load_json
 from forestall.records.pictures import encode_jpeg, file_name
 from forestall.records.plain import plain
-from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, StoredObservation
+from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord
 from forestall.types.observation import Observation
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, When

@@ -33,9 +33,9 @@ def page_html(record: EpisodeRecord, folder: Path | None = None) -> str:
     environment.filters["sign"] = status_sign
     environment.filters["in_words"] = in_words
     environment.filters["svg"] = Markup  # graph_svg escapes its own texts
-    folder = files("forestall.report").joinpath("templates")
-    style = folder.joinpath("page.css").read_text(encoding="utf-8")
-    script = folder.joinpath("page.js").read_text(encoding="utf-8")
+    templates = files("forestall.report").joinpath("templates")
+    style = templates.joinpath("page.css").read_text(encoding="utf-8")
+    script = templates.joinpath("page.js").read_text(encoding="utf-8")
     return environment.get_template("page.html.jinja").render(
         page=page_view(record, folder),
         record=record,
