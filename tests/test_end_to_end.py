@@ -17,9 +17,12 @@ import pytest
 from forestall.cli.main import call
 from forestall.memory.store import open_store
 from forestall.perception.folder import write_observation
+from forestall.records.codec import record_to_json
+from forestall.records.derived import reasoning_s
 from forestall.records.record import read_record
 from forestall.tasks.faults import apply_scene_faults
 from forestall.tasks.files import load_scenario, load_task, scenario_names
+from forestall.types.episode import EpisodeEnd
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 pytestmark = pytest.mark.slow
@@ -101,7 +104,16 @@ def test_the_main_job(memory: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert {"observe", "perceive", "compare", "replan"} <= set(data["compute_s"])
     page = Path(data["page"]).read_text(encoding="utf-8")
     assert "Bowl-1" in page and "<svg" in page and "data:image/" in page
-    assert read_record(tmp_path / "run" / "record.json")["success"] is True
+    whole = read_record(tmp_path / "run")
+    assert whole.success is True and record_to_json(whole, page=data["page"]) == data
+    killed = read_record(tmp_path / "run" / "boundaries.jsonl")
+    assert killed.boundaries == whole.boundaries
+    assert killed.compute_s == whole.boundaries[-1].compute_s
+    assert reasoning_s(killed.compute_s) > 0.9 * data["reasoning_s"]
+    assert call(["page", str(tmp_path / "run"), "--out", str(tmp_path / "again.html")]) == 0
+    again = (tmp_path / "again.html").read_text(encoding="utf-8")
+    assert again.count("data:image/") == page.count("data:image/")
+    assert call(["demos", "add", str(tmp_path / "no.db"), str(tmp_path / "run")]) == 2
 
 
 def test_without_replanning_the_same_scene_fails(
@@ -123,6 +135,13 @@ def test_an_undisturbed_run_is_left_alone(
     data = json.loads(capsys.readouterr().out)
     assert data["success"] is True
     assert data["executed"][-1]["subtask"] == "toggle_on(Microwave-1)"
+    own = tmp_path / "own.db"
+    assert call(["demos", "add", str(own), str(tmp_path)]) == 0
+    with open_store(own) as store:
+        (demonstration,) = store.required()
+    assert [str(s.subtask) for s in demonstration.steps] == [
+        b["subtask"] for b in data["boundaries"]
+    ]
 
 
 @pytest.mark.xdist_group("heat-potato")
@@ -141,8 +160,11 @@ def test_a_killed_run_leaves_memory_and_record_readable(memory: Path, tmp_path: 
     process.wait()
     assert open_store(memory).digest() == before
     record = read_record(lines)
-    assert record["complete"] is False
-    assert len(record["boundaries"]) >= 1
+    assert record.end is EpisodeEnd.UNFINISHED
+    assert len(record.boundaries) >= 1
+    assert call(["page", str(tmp_path / "run")]) == 0
+    page = (tmp_path / "run" / "index.html").read_text(encoding="utf-8")
+    assert "unfinished" in page and "data:image/" in page
 
 
 @pytest.mark.xdist_group("heat-potato")

@@ -36,6 +36,7 @@ from forestall.seams import (
 )
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
+from forestall.types.observation import Observation
 
 STATES = "learned"
 """Where object states come from when nothing is said."""
@@ -238,7 +239,7 @@ def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord],
     captioner = make_captioner(config.captioner, domain)
 
     def view(boundary: BoundaryRecord) -> View | None:
-        if boundary.observation is None:
+        if not isinstance(boundary.observation, Observation):
             return None
         return view_of(boundary.observation, boundary.scoped, encoder, captioner)
 

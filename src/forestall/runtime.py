@@ -1,42 +1,37 @@
-"""The one episode loop: look, perceive, ask the strategy, act, and look again where it asks to.
+"""The one episode loop: an environment around a monitor.
 
-It sees only L0; environment, perceiver, strategy and listeners come through the constructor. All
-strategies run in this loop, so that a measured difference between them is theirs. Listeners are
-told what happened and cannot change it.
+It drives, looks and acts where the monitor says so; the monitor judges. All strategies run in this
+loop, so that a measured difference between them is theirs. Listeners are told what happened and
+cannot change it.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from forestall.domain.names import executable, ground_subtask
+from forestall.conclusion import MonitorConfig
 from forestall.errors import ForestallError
-from forestall.types.episode import (
-    BoundaryRecord,
-    EpisodeEnd,
-    EpisodeRecord,
-    ExecutedRecord,
-    SkillStatus,
-)
-from forestall.types.facts import category_of, is_instance
-from forestall.types.graph import SceneGraph
-from forestall.types.observation import Observation, Vec3
-from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
+from forestall.monitor import Monitor
+from forestall.records.plain import plain
+from forestall.types.decision import Hold, MonitorDecision, Outcome
+from forestall.types.episode import BoundaryRecord, EpisodeEnd, EpisodeRecord
+from forestall.types.observation import Observation
+from forestall.types.plan import Plan
+from forestall.types.runtime import LooksAfter
 from forestall.types.task import Task
-from forestall.types.verdict import Decision
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from forestall.domain.model import Domain
     from forestall.seams import Environment, Listener, Perceiver, Strategy
 
 Score = Callable[[EpisodeRecord], EpisodeRecord]
+
+_ENDS = {
+    Hold.STOPPED: EpisodeEnd.STOPPED,
+    Hold.REPLAN_LIMIT: EpisodeEnd.REPLAN_LIMIT,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,37 +53,27 @@ class RuntimeConfig:
     keep_observations: bool = True
     final_look: bool = False
 
+    def monitor(self) -> MonitorConfig:
+        """The same bounds for the monitor.
+
+        In a simulated run a subtask starts although nothing was judged, or although an alarm was
+        not answered: what comes of it is what is measured.
+        """
+        return MonitorConfig(
+            self.max_subtasks,
+            self.max_replans,
+            self.max_looks,
+            on_not_judged="proceed",
+            on_alarm="proceed",
+        )
+
 
 @dataclass(slots=True)
 class _Episode:
-    """What changes while one episode runs."""
+    """What is kept of one episode beside what the monitor knows."""
 
-    task: Task
-    plan: Plan
-    start: Plan
-    graph: SceneGraph = field(default_factory=lambda: SceneGraph(()))
-    robot_world_m: Vec3 = (0.0, 0.0, 0.0)
-    time_s: float = 0.0
-    index: int = 0
-    replans: int = 0
-    judged: int = 0
-    worked_at: Vec3 | None = None
-    bound: dict[str, str] = field(default_factory=dict)
     boundaries: list[BoundaryRecord] = field(default_factory=list)
-    executed: list[ExecutedRecord] = field(default_factory=list)
-    seconds: dict[str, float] = field(default_factory=dict)
-    final: SceneGraph | None = None
-
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        started = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.add(name, time.perf_counter() - started)
-
-    def add(self, name: str, seconds: float) -> None:
-        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
+    time_s: float = 0.0
 
 
 class Runtime:
@@ -106,9 +91,9 @@ class Runtime:
         self._environment = environment
         self._perceiver = perceiver
         self._strategy = strategy
-        self._domain = domain
         self._listeners = tuple(listeners)
         self._config = config or RuntimeConfig()
+        self._monitor = Monitor(strategy, domain, perceiver, self._config.monitor())
 
     def run(
         self,
@@ -133,10 +118,14 @@ class Runtime:
         """
         for listener in self._listeners:
             listener.on_start(task, plan, seed)
-        episode = _Episode(task, plan, start=plan)
+        monitor, episode = self._monitor, _Episode()
         end, broken = EpisodeEnd.ERROR, None
         try:
-            self._begin(episode, seed)
+            monitor.start(task, plan)
+            self._environment.reset(seed)
+            with monitor.phase("observe"):
+                around = self._environment.scan()
+            monitor.observe(around)
             end = self._loop(episode)
         except Exception as error:  # noqa: BLE001 - whatever breaks, what came before is kept
             broken = error
@@ -147,14 +136,17 @@ class Runtime:
             seed=seed,
             initial_plan=plan,
             boundaries=tuple(episode.boundaries),
-            executed=tuple(episode.executed),
+            executed=monitor.executed,
             end=end,
             success=None if broken is None else False,
             failures=() if broken is None else (f"the run broke off: {broken}",),
             simulated_s=episode.time_s,
-            compute_s=tuple(sorted(episode.seconds.items())),
-            final=episode.final,
-            provenance=(*provenance, ("perception", dict(self._perceiver.describe()))),
+            compute_s=monitor.seconds,
+            final=monitor.final,
+            provenance=tuple(
+                (name, plain(value))
+                for name, value in (*provenance, ("perception", self._perceiver.describe()))
+            ),
         )
         if score is not None and broken is None:
             record = score(record)
@@ -164,227 +156,81 @@ class Runtime:
             raise broken
         return record
 
-    def _begin(self, episode: _Episode, seed: int) -> None:
-        """Reset everything and look around once."""
-        self._environment.reset(seed)
-        self._perceiver.reset()
-        with episode.phase("observe"):
-            observation = self._environment.scan()
-        with episode.phase("perceive"):
-            episode.graph = self._perceiver.perceive(observation)
-        episode.robot_world_m = observation.robot_position_world_m
-
     def _loop(self, episode: _Episode) -> EpisodeEnd:
-        context: BoundaryContext | None = None
-        while len(episode.executed) < self._config.max_subtasks:
-            if episode.index >= len(episode.plan):
-                if context is None:
-                    return EpisodeEnd.PLAN_FINISHED
-                answer = self._finish(episode, context)
-                if not _asks_for_plan(answer):
+        monitor = self._monitor
+        while not monitor.exhausted:
+            if monitor.finished:
+                decision = self._finish(episode)
+                goes_on = decision.outcome is Outcome.REPLAN
+                if not goes_on and decision.hold is not Hold.REPLAN_LIMIT:
                     return EpisodeEnd.PLAN_FINISHED
             else:
-                context, answer = self._start(episode)
-                if answer.decision is not Decision.STOP and not _asks_for_plan(answer):
-                    answer = self._execute(episode, context)
-            if answer.decision is Decision.STOP:
-                return EpisodeEnd.STOPPED
-            if _asks_for_plan(answer):
-                if episode.replans >= self._config.max_replans:
-                    return EpisodeEnd.REPLAN_LIMIT
-                self._adopt(episode, answer)
+                decision = self._before(episode)
+                if decision.may_start:
+                    decision = self._execute(episode, decision) or decision
+            if decision.hold is not None:
+                return _ENDS[decision.hold]
         return EpisodeEnd.SUBTASK_LIMIT
 
-    def _start(self, episode: _Episode) -> tuple[BoundaryContext, StrategyAnswer]:
+    def _before(self, episode: _Episode) -> MonitorDecision:
         """Go to where the next subtask will be done, and judge what is seen there."""
-        before = dict(episode.seconds)
-        with episode.phase("act"):
-            self._approach(episode)
-        subtask = self._ground(episode)
-        found = self._judge(
-            episode, When.BEFORE, episode.index, subtask, self._strategy.before_subtask, before
-        )
-        episode.judged += 1
-        return found
+        with self._monitor.phase("act"):
+            place = self._monitor.approach()
+            if place is not None:
+                self._environment.approach(place)
+        return self._judged(episode, self._monitor.before)
 
-    def _finish(self, episode: _Episode, last: BoundaryContext) -> StrategyAnswer:
-        """The plan is finished: look at the last subtask's place once more, if anybody wants to."""
-        ask = self._strategy.after_episode
-        if not (self._config.final_look or self._strategy.looks_after is not LooksAfter.NOTHING):
-            return ask(last)
-        context, answer = self._judge(episode, When.END, len(episode.plan), last.subtask, ask)
-        episode.judged += 1
-        episode.final = context.graph
-        return answer
-
-    def _judge(
-        self,
-        episode: _Episode,
-        when: When,
-        index: int,
-        subtask: Subtask,
-        ask: Callable[[BoundaryContext], StrategyAnswer],
-        before: dict[str, float] | None = None,
-    ) -> tuple[BoundaryContext, StrategyAnswer]:
-        """Look towards what a subtask concerns, perceive, and ask the strategy.
-
-        Every look is judged and recorded; the looks of one boundary share its index.
-        """
-        before = dict(episode.seconds) if before is None else before
-        with episode.phase("observe"):
-            observation = self._look(episode, subtask)
-        for look in range(1, self._config.max_looks + 1):
-            with episode.phase("perceive"):
-                episode.graph = self._perceiver.perceive(observation)
-                episode.robot_world_m = observation.robot_position_world_m
-                if when is When.BEFORE:
-                    subtask = self._ground(episode)
-                context = self._context(episode, when, index, subtask, observation, look)
-            started = time.perf_counter()
-            answer = ask(context)
-            spent = time.perf_counter() - started
-            for name, seconds in answer.seconds:
-                episode.add(name, seconds)
-            episode.add("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
-            self._note(episode, context, answer, before)
-            before = dict(episode.seconds)
-            if answer.decision is not Decision.LOOK_AGAIN:
-                break
-            with episode.phase("observe"):
-                around = self._environment.scan(thorough=True)
-                ahead = self._look(episode, subtask)
-                observation = replace(ahead, frames=(*around.frames, *ahead.frames))
-        return context, answer
-
-    def _note(
-        self,
-        episode: _Episode,
-        context: BoundaryContext,
-        answer: StrategyAnswer,
-        before: dict[str, float],
-    ) -> None:
-        spent = {k: v - before.get(k, 0.0) for k, v in episode.seconds.items()}
-        episode.boundaries.append(
-            BoundaryRecord(
-                index=episode.judged - (context.when is When.AFTER),
-                subtask=context.subtask,
-                graph=context.graph,
-                scoped=context.scoped,
-                observation=context.observation if self._config.keep_observations else None,
-                looks=context.looks,
-                verdict=answer.verdict,
-                diagnosis=answer.diagnosis,
-                replan=answer.replan,
-                why=answer.why,
-                seconds=tuple(sorted((k, v) for k, v in spent.items() if v > 0)),
-                time_s=self._environment.time_s,
-                when=context.when,
-                watched=answer.watched,
-            )
-        )
-        episode.time_s = self._environment.time_s
-        for listener in self._listeners:
-            listener.on_boundary(context, answer)
-
-    def _execute(self, episode: _Episode, context: BoundaryContext) -> StrategyAnswer:
-        planned = episode.plan.subtasks[episode.index]
-        command = executable(context.subtask, planned, self._domain)
-        with episode.phase("act"):
+    def _execute(self, episode: _Episode, decision: MonitorDecision) -> MonitorDecision | None:
+        monitor, command = self._monitor, decision.command
+        assert command is not None, "what may start has a command"
+        with monitor.phase("act"):
             outcome = self._environment.execute(command)
-        for name in context.subtask.args:
-            if is_instance(name):
-                episode.bound[category_of(name)] = name
-        if outcome.status is SkillStatus.REFUSED:
-            episode.bound.clear()
-        episode.worked_at = outcome.hand_world_m
+        answer = monitor.after(outcome)
         episode.time_s = self._environment.time_s
-        episode.executed.append(ExecutedRecord(command, outcome, episode.judged - 1))
         for listener in self._listeners:
-            listener.on_executed(command, outcome, episode.time_s)
-        index, episode.index = episode.index, episode.index + 1
-        outcome = replace(outcome, reason="")  # it may name what the robot has not seen
-        if self._strategy.looks_after is not LooksAfter.SUBTASK:
-            return self._strategy.after_subtask(context, outcome)
-        _, answer = self._judge(
-            episode,
-            When.AFTER,
-            index,
-            context.subtask,
-            lambda seen: self._strategy.after_subtask(seen, outcome),
-        )
-        return answer
+            listener.on_executed(monitor.executed[-1], episode.time_s)
+        if answer is None or answer.outcome is not Outcome.LOOK:
+            return answer
+        return self._judged(episode, lambda seen: _some(monitor.after(outcome, seen)))
 
-    def _adopt(self, episode: _Episode, answer: StrategyAnswer) -> None:
-        assert answer.replan is not None and answer.replan.plan is not None
-        episode.plan = answer.replan.plan
-        episode.index = 0
-        episode.replans += 1
+    def _finish(self, episode: _Episode) -> MonitorDecision:
+        """The plan is finished: look at the last subtask's place once more, if anybody wants to."""
+        monitor = self._monitor
+        looks = self._config.final_look or monitor.looks_after is not LooksAfter.NOTHING
+        if not looks or monitor.last is None:
+            return monitor.finish()
+        return self._judged(episode, monitor.finish)
 
-    def _ground(self, episode: _Episode) -> Subtask:
-        return ground_subtask(
-            episode.plan.subtasks[episode.index],
-            episode.graph,
-            self._domain,
-            episode.robot_world_m,
-            episode.bound,
-        )
+    def _judged(
+        self, episode: _Episode, ask: Callable[[Observation], MonitorDecision]
+    ) -> MonitorDecision:
+        """Look, ask, and look all around where the monitor wants another look.
 
-    def _approach(self, episode: _Episode) -> None:
-        """Go where the subtask will be done and look from there.
-
-        A skill whose target is out of reach drives there by itself; doing that first lets the
-        decision be taken on what can be seen at the place and not from across the room.
+        Every look is judged and recorded.
         """
-        subtask = self._ground(episode)
-        node = episode.graph.get(subtask.args[-1])
-        if (
-            self._domain.skill(subtask.skill).drives
-            or node is None
-            or node.centroid_m is None
-            or self._domain.is_open_support(node.category)
-        ):
-            return
-        self._environment.approach(node.id)
+        with self._monitor.phase("observe"):
+            observation = self._environment.observe(self._monitor.wanted_views())
+        while True:
+            decision = ask(observation)
+            self._note(episode, decision)
+            if decision.outcome is not Outcome.LOOK:
+                return decision
+            with self._monitor.phase("observe"):
+                around = self._environment.scan(thorough=True)
+                ahead = self._environment.observe(decision.look_at)
+                observation = replace(ahead, frames=(*around.frames, *ahead.frames))
 
-    def _look(self, episode: _Episode, subtask: Subtask) -> Observation:
-        """Towards where the hand let go last, and the arguments that it does not hold."""
-        holding = episode.graph.holding
-        points: list[Vec3] = [] if episode.worked_at is None else [episode.worked_at]
-        for name in subtask.args:
-            node = episode.graph.get(name)
-            if node is not None and node.centroid_m is not None and node.id != holding:
-                points.append(node.centroid_m)
-        return self._environment.observe(points)
-
-    def _context(
-        self,
-        episode: _Episode,
-        when: When,
-        index: int,
-        subtask: Subtask,
-        observation: Observation,
-        look: int,
-    ) -> BoundaryContext:
-        left = len(episode.plan) - index
-        return BoundaryContext(
-            task=episode.task,
-            plan=episode.plan,
-            index=index,
-            done=max(0, len(episode.start) - left),
-            subtask=subtask,
-            graph=episode.graph,
-            scoped=self._perceiver.scope(episode.graph, subtask),
-            observation=observation,
-            looks=look,
-            may_look=look < self._config.max_looks,
-            replans=episode.replans,
-            when=when,
-        )
+    def _note(self, episode: _Episode, decision: MonitorDecision) -> None:
+        record, context = decision.record, decision.context
+        assert record is not None and context is not None, "what was looked at is recorded"
+        if not self._config.keep_observations:
+            record = replace(record, observation=None)
+        episode.boundaries.append(record)
+        episode.time_s = self._environment.time_s
+        for listener in self._listeners:
+            listener.on_boundary(record, context)
 
 
-def _asks_for_plan(answer: StrategyAnswer) -> bool:
-    return (
-        answer.decision is Decision.REPLAN
-        and answer.replan is not None
-        and answer.replan.plan is not None
-    )
+def _some(decision: MonitorDecision | None) -> MonitorDecision:
+    assert decision is not None, "what is looked at after a subtask is judged"
+    return decision

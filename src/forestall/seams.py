@@ -1,6 +1,6 @@
 """Every Protocol of the project; implementations never import each other.
 
-Calls point downwards: a command builds a runtime (`build.py`), the runtime calls its strategy, the
+Calls point downwards: a command builds a runtime (`build.py`), its monitor calls the strategy, the
 strategy calls detector, reasoner, replanner; all of them see only this file and `types/`.
 """
 
@@ -15,7 +15,13 @@ import numpy.typing as npt
 from forestall.domain.model import Domain
 from forestall.types.demonstration import Demonstration
 from forestall.types.encoder import StateReading
-from forestall.types.episode import EpisodeRecord, Event, SkillOutcome
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeRecord,
+    Event,
+    ExecutedRecord,
+    SkillOutcome,
+)
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
@@ -231,9 +237,9 @@ class Detector(Protocol):
     name: str
 
     def judge(
-        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
-        """`observed` is the scoped graph of the boundary."""
+        """`observed` is the scoped graph of the boundary; it may be all that there is."""
 
 
 class Reasoner(Protocol):
@@ -290,10 +296,10 @@ class Listener(Protocol):
     def on_start(self, task: Task, plan: Plan, seed: int) -> None:
         """The episode begins."""
 
-    def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
-        """A boundary was judged."""
+    def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
+        """A boundary was judged: its record, and what was known."""
 
-    def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
+    def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A subtask was executed."""
 
     def on_end(self, record: EpisodeRecord) -> None:

@@ -21,7 +21,7 @@ from forestall.config import DEMONSTRATION_SEEDS
 from forestall.demonstrations import ready_made
 from forestall.errors import FileFormatError, InputError
 from forestall.memory.store import open_store
-from forestall.records.as_json import record_json
+from forestall.records.codec import record_to_json
 from forestall.records.record import replace_file
 from forestall.tasks.files import load_scenario
 from forestall.types.demonstration import Demonstration
@@ -138,7 +138,7 @@ def run_job(job: Job) -> dict[str, Any]:
     """Run one episode and keep what is counted."""
     demonstrations = None if job.strategy == "none" else _demonstrations(job)
     record = run_episode(prepare(job.config), demonstrations)
-    data = record_json(record, page=None, images={})
+    data = record_to_json(record)
     kept = ("success", "weak_success", "failures", "end", "replans", "simulated_s", "reasoning_s")
     return (
         asdict(job)

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from forestall.seams import Listener
+from forestall.types.decision import Outcome
 from forestall.types.episode import (
     BoundaryRecord,
     EpisodeEnd,
@@ -19,7 +21,7 @@ from forestall.types.facts import Literal
 from forestall.types.graph import Relation, SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
 from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import (
@@ -188,6 +190,8 @@ def boundary(
         replan=solved() if alarm else None,
         seconds=PHASES + more,
         time_s=4.0 * index,
+        outcome=Outcome.REPLAN if alarm else Outcome.PROCEED,
+        compute_s=tuple((name, (index + 1) * seconds) for name, seconds in PHASES),
     )
 
 
@@ -355,13 +359,13 @@ def empty_record() -> EpisodeRecord:
     )
 
 
-def calls(record: EpisodeRecord) -> list[tuple[BoundaryContext, StrategyAnswer]]:
+def calls(record: EpisodeRecord) -> list[tuple[BoundaryRecord, BoundaryContext]]:
     """What a listener would have been told at the boundaries of a record."""
     found = []
     plan, index = record.initial_plan, 0
     for b in record.boundaries:
         index -= b.when is When.AFTER
-        assert b.observation is not None
+        assert isinstance(b.observation, Observation)
         context = BoundaryContext(
             task=record.task,
             plan=plan,
@@ -374,22 +378,22 @@ def calls(record: EpisodeRecord) -> list[tuple[BoundaryContext, StrategyAnswer]]
             looks=b.looks,
             when=b.when,
         )
-        solved_it = b.replan is not None and b.replan.outcome is ReplanOutcome.SOLVED
-        decision = Decision.REPLAN if solved_it else Decision.PROCEED
-        found.append(
-            (
-                context,
-                StrategyAnswer(
-                    decision,
-                    b.verdict,
-                    b.diagnosis,
-                    b.replan,
-                    seconds=b.seconds,
-                    watched=b.watched,
-                ),
-            )
-        )
+        found.append((b, context))
         index += 1
-        if solved_it and b.replan is not None and b.replan.plan is not None:
+        if b.replan is not None and b.replan.outcome is ReplanOutcome.SOLVED:
+            assert b.replan.plan is not None
             plan, index = b.replan.plan, 0
     return found
+
+
+def follow(listener: Listener, record: EpisodeRecord, boundaries: int | None = None) -> None:
+    """Tell a listener of a run, of its first boundaries only where a number is given."""
+    listener.on_start(record.task, record.initial_plan, record.seed)
+    executed = {e.index: e for e in record.executed}
+    for boundary, context in calls(record)[:boundaries]:
+        listener.on_boundary(boundary, context)
+        if context.when is When.BEFORE and boundary.index in executed:
+            step = executed[boundary.index]
+            listener.on_executed(step, 4.0 * step.index + 4)
+    if boundaries is None:
+        listener.on_end(record)

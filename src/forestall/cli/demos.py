@@ -71,6 +71,39 @@ def record(
     return 0
 
 
+@demos.command
+def add(memory: Path, /, *runs: Path) -> int:
+    """Keep runs that were recorded before as demonstrations.
+
+    Args:
+        memory: the demonstration file to add to; made when it does not exist.
+        runs: folders of `forestall run`; every one must have succeeded without a replanning, a
+            refusal or a failure on the way.
+    """
+    import forestall
+    from forestall.errors import InputError
+    from forestall.memory.recording import demonstration_from
+    from forestall.memory.store import open_store
+    from forestall.records.record import read_record
+
+    if not runs:
+        raise InputError("no run was named: give the folder of at least one")
+    found = []
+    for folder in runs:
+        demonstration = demonstration_from(read_record(folder), forestall.__version__)
+        if demonstration is None:
+            raise InputError(
+                f"{folder} is no demonstration: only a finished run becomes one that succeeded "
+                "without a new plan, a refusal or a failure on the way"
+            )
+        found.append(demonstration)
+    with open_store(memory, create=True) as store:
+        for demonstration in found:
+            store.add(demonstration)
+    print(f"{len(found)} demonstrations added to {memory}")
+    return 0
+
+
 @demos.command(name="list")
 def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
     """List the demonstrations of a memory.

@@ -21,6 +21,7 @@ from forestall.cli.doctor import doctor
 from forestall.cli.encoder import encoder
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
+from forestall.cli.page import page
 from forestall.cli.run import run
 from forestall.errors import ForestallError, InputError
 
@@ -30,7 +31,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, tasks, scenarios, check, compare, doctor):
+for command in (run, page, tasks, scenarios, check, compare, doctor):
     app.command(command)
 app.command(demos)
 app.command(bench)

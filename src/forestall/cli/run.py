@@ -62,8 +62,9 @@ def run(
         quiet: no progress on standard error.
     """
     from forestall.build import RunConfig, prepare, provenance, run_episode
+    from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
-    from forestall.records.record import RECORD_NAME, RunRecorder, read_record
+    from forestall.records.record import RunRecorder, read_record
     from forestall.report.page import write_page
 
     config = RunConfig(
@@ -97,7 +98,7 @@ def run(
     with ProgressLine(quiet=quiet) as line:
         record = run_episode(prepared, demonstrations, [recorder, line], used)
     write_page(record, page)
-    data = read_record(folder / RECORD_NAME)
+    data = record_to_json(read_record(folder), page=str(page))
     if as_json:
         print(json.dumps(data, indent=2))
     else:

@@ -37,13 +37,15 @@ class CaptionDetector:
         self._config = config or DetectorConfig()
 
     def judge(
-        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """Compare what the captioner says with what it said of every reference.
 
         Raises:
             InputError: a reference's caption comes from another captioner.
         """
+        if observation is None:
+            return judged(self.name, self._config, (), len(references), "no picture was given")
         kept = []
         for r in references:
             if r.view is not None and r.view.captioner:

@@ -32,13 +32,15 @@ class ImageDetector:
         self._config = config or DetectorConfig()
 
     def judge(
-        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """Compare the picture with that of every reference.
 
         Raises:
             InputError: a reference's feature comes from another encoder.
         """
+        if observation is None:
+            return judged(self.name, self._config, (), len(references), "no picture was given")
         kept = []
         for r in references:
             if r.view is not None and r.view.image is not None:

@@ -38,7 +38,7 @@ class ObjectCountDetector:
         self._config = config or DetectorConfig()
 
     def judge(
-        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """Compare the counts of the scoped graph with those of every reference."""
         mine = counts(observed, self._supports)

@@ -66,7 +66,7 @@ class SceneGraphDetector:
         self._config = config or DetectorConfig()
 
     def judge(
-        self, observed: SceneGraph, observation: Observation, references: Sequence[Reference]
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """Compare the scoped graph of a boundary with every reference."""
         config = self._config

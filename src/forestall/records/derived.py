@@ -19,7 +19,7 @@ from forestall.types.episode import (
 )
 from forestall.types.facts import category_of
 from forestall.types.plan import Plan, Subtask, same_step
-from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
+from forestall.types.runtime import When
 from forestall.types.verdict import Decision, Replan, ReplanOutcome
 
 SIMULATOR_PHASES = frozenset({"act", "observe"})
@@ -123,26 +123,6 @@ def new_plan(replan: Replan | None) -> Plan | None:
     if replan is None or replan.outcome is not ReplanOutcome.SOLVED:
         return None
     return replan.plan
-
-
-def boundary_of(index: int, context: BoundaryContext, answer: StrategyAnswer) -> BoundaryRecord:
-    """The record of a boundary as a listener sees it."""
-    return BoundaryRecord(
-        index=index,
-        subtask=context.subtask,
-        graph=context.graph,
-        scoped=context.scoped,
-        observation=context.observation,
-        looks=context.looks,
-        verdict=answer.verdict,
-        diagnosis=answer.diagnosis,
-        replan=answer.replan,
-        why=answer.why,
-        seconds=answer.seconds,
-        time_s=context.observation.time_s,
-        when=context.when,
-        watched=answer.watched,
-    )
 
 
 def cause_of(boundary: BoundaryRecord) -> str:

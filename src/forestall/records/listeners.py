@@ -15,9 +15,10 @@ from rich.markup import escape
 from rich.text import Text
 
 from forestall.records.derived import in_words
-from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
-from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
+from forestall.types.decision import Outcome
+from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
+from forestall.types.plan import Plan
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.task import Task
 from forestall.types.verdict import Decision
 
@@ -71,26 +72,28 @@ class ProgressLine:
         elif not self._quiet:
             self._say(f"{task.name}, seed {seed}: {len(plan)} subtasks")
 
-    def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
+    def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged."""
-        self._now = str(context.subtask)
-        remaining = len(context.plan) - context.index - (context.when is When.AFTER)
-        verdict = answer.verdict
+        self._now = str(boundary.subtask)
+        remaining = len(context.plan) - context.index - (boundary.when is When.AFTER)
+        moment = f"{in_words(boundary.when)} {boundary.subtask}"
+        verdict = boundary.verdict
         if verdict is not None and verdict.decision is Decision.REPLAN:
             self._alarms += 1
-            cause = "" if answer.diagnosis is None else f": {answer.diagnosis.cause}"
-            self._say(f"alarm {in_words(context.when)} {context.subtask}{cause}", "yellow")
-        plan = None if answer.replan is None else answer.replan.plan
-        if answer.decision is Decision.REPLAN and plan is not None:
+            cause = "" if boundary.diagnosis is None else f": {boundary.diagnosis.cause}"
+            self._say(f"alarm {moment}{cause}", "yellow")
+        plan = None if boundary.replan is None else boundary.replan.plan
+        if boundary.outcome is Outcome.REPLAN and plan is not None:
             remaining = len(plan)
             self._say(f"new plan: {remaining} subtasks", "cyan")
-        if answer.decision is Decision.STOP:
-            self._say(f"stopped {in_words(context.when)} {context.subtask}: {answer.why}", "red")
+        if boundary.outcome is Outcome.HOLD:
+            self._say(f"stopped {moment}: {boundary.why}", "red")
         self._total = self._done + remaining
         self._refresh()
 
-    def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
+    def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A subtask was executed."""
+        subtask, outcome = executed.subtask, executed.outcome
         self._done += 1
         self._simulated_s = time_s
         fine = outcome.status is SkillStatus.SUCCEEDED

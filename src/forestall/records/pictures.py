@@ -9,7 +9,12 @@ import base64
 import hashlib
 import io
 from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
+
+from forestall.errors import FileFormatError
+from forestall.types.episode import StoredFrame
 from forestall.types.observation import Frame, Rgb
 
 _QUALITIES = (84, 72, 60, 45, 30, 18)
@@ -42,23 +47,50 @@ def file_name(data: bytes) -> str:
     return f"{hashlib.sha256(data).hexdigest()[:16]}.jpg"
 
 
-def page_picture(frame: Frame, *, width: int, budget_bytes: int) -> Picture:
-    """A frame as data URI in the best quality that fits into `budget_bytes` characters.
+def rgb_of(frame: Frame | StoredFrame, folder: Path | None) -> Rgb | None:
+    """The picture of a frame, None where it was not kept or is not there any more.
+
+    Args:
+        frame: as seen, or as a record has it.
+        folder: of the record.
+
+    Raises:
+        FileFormatError: the file is not a picture.
+    """
+    from PIL import Image
+
+    if isinstance(frame, Frame):
+        return frame.rgb
+    if frame.picture is None or folder is None:
+        return None
+    path = folder / frame.picture
+    if not path.is_file():
+        return None
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image.convert("RGB"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise FileFormatError(f"{path} is not a picture: {error}") from error
+
+
+def page_picture(rgb: Rgb, *, width: int, budget_bytes: int) -> Picture:
+    """A picture as data URI in the best quality that fits into `budget_bytes` characters.
 
     Where even the lowest quality does not fit, the picture gets smaller.
     """
     while True:
         for quality in _QUALITIES:
-            data = encode_jpeg(frame.rgb, width=width, quality=quality)
+            data = encode_jpeg(rgb, width=width, quality=quality)
             if len(data) * 4 / 3 <= budget_bytes:
-                return _picture(frame, data, width)
+                return _picture(rgb, data, width)
         if width <= 64:
-            return _picture(frame, data, width)
+            return _picture(rgb, data, width)
         width = width * 3 // 4
 
 
-def _picture(frame: Frame, data: bytes, width: int) -> Picture:
-    shown = min(width, frame.intrinsics.width)
-    height = max(1, round(frame.intrinsics.height * shown / frame.intrinsics.width))
+def _picture(rgb: Rgb, data: bytes, width: int) -> Picture:
+    full_height, full_width = rgb.shape[:2]
+    shown = min(width, full_width)
+    height = max(1, round(full_height * shown / full_width))
     uri = "data:image/jpeg;base64," + base64.b64encode(data).decode("ascii")
     return Picture(uri, shown, height)

@@ -2,7 +2,8 @@
 
 `RunRecorder` listens to the episode loop. A folder holds `record.json` (the finished run, see
 `docs/record-format.md`), `boundaries.jsonl` (one line for each thing that happened, flushed at
-once, so that a killed run can still be read) and `images/`.
+once, so that a killed run can still be read) and `images/`. Both are read into an `EpisodeRecord`
+by the one codec (`codec.py`).
 """
 
 from __future__ import annotations
@@ -10,25 +11,29 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError, InputError
-from forestall.records.as_json import (
+from forestall.records.boundaries import boundary_json, by_reference, executed_json
+from forestall.records.codec import (
     KIND,
     RECORD_FORMAT,
     alarm_json,
-    boundary_json,
-    executed_json,
-    goal_json,
-    plain,
-    record_json,
+    check_header,
+    head_json,
+    record_from_json,
+    record_to_json,
 )
-from forestall.records.derived import alarm_at, boundary_of, new_plan, reasoning_s
+from forestall.records.derived import alarm_at, new_plan
+from forestall.records.fields import Field, load_json
 from forestall.records.pictures import encode_jpeg, file_name
-from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillOutcome
-from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
+from forestall.records.plain import plain
+from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord
+from forestall.types.observation import Observation
+from forestall.types.plan import Plan
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.task import Task
 
 RECORD_NAME = "record.json"
@@ -54,7 +59,7 @@ class RunRecorder:
         folder: Path | str,
         *,
         scenario: str | None = None,
-        strategy: str | None = None,
+        strategy: str = "",
         provenance: Mapping[str, Any] | None = None,
         page: str | None = None,
     ) -> None:
@@ -64,9 +69,7 @@ class RunRecorder:
         self._provenance = dict(provenance or {})
         self._page = page
         self._started = False
-        self._position = 0
-        self._index = -1
-        self._looks = 0
+        self._stored: list[BoundaryRecord] = []
 
     def on_start(self, task: Task, plan: Plan, seed: int) -> None:
         """The episode begins."""
@@ -74,52 +77,44 @@ class RunRecorder:
         (self.folder / RECORD_NAME).unlink(missing_ok=True)
         (self.folder / LINES_NAME).write_text("", encoding="utf-8")
         self._started = True
-        self._position = 0
-        self._index, self._looks = -1, 0
+        self._stored = []
         self._write(
             "start",
             kind=KIND,
             format=RECORD_FORMAT,
-            task=task.name,
-            title=task.title,
-            goal=goal_json(task.goal),
-            scenario=self._scenario,
-            strategy=self._strategy,
-            seed=seed,
-            initial_plan=plan.texts(),
+            **head_json(task, plan, self._scenario, self._strategy, seed),
             provenance=self._provenance,
         )
 
-    def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
+    def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged."""
-        again = context.looks == self._looks + 1 and context.looks > 1
-        if context.when is not When.AFTER and not again:
-            self._index += 1
-        self._looks = context.looks
-        boundary = boundary_of(self._index, context, answer)
+        boundary = _stored(self.folder, boundary)
+        position = len(self._stored)
         plan = new_plan(boundary.replan)
-        alarm = alarm_at(self._position, boundary, plan)
+        alarm = alarm_at(position, boundary, plan)
         self._write(
             "boundary",
             boundary=boundary_json(
                 boundary,
-                position=self._position,
-                image=_write_image(self.folder, boundary),
+                position=position,
                 mark=None,
                 before=context.remaining()[context.when is When.AFTER :],
                 after=None if plan is None else plan.subtasks,
             ),
             alarm=None if alarm is None else alarm_json(alarm),
         )
-        self._position += 1
+        self._stored.append(boundary)
 
-    def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
+    def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A subtask was executed."""
-        executed = ExecutedRecord(subtask, outcome, max(0, self._index))
         self._write("executed", time_s=time_s, executed=executed_json(executed))
 
     def on_end(self, record: EpisodeRecord) -> None:
         """The episode is over."""
+        if len(self._stored) == len(record.boundaries):  # their pictures are written already
+            both = zip(record.boundaries, self._stored, strict=True)
+            stored = tuple(replace(b, observation=s.observation) for b, s in both)
+            record = replace(record, boundaries=stored)
         write_record(self.folder, record, page=self._page)
         self._write("end", end=record.end.value)
 
@@ -145,29 +140,27 @@ def write_record(folder: Path | str, record: EpisodeRecord, *, page: str | None 
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    images = {
-        position: name
-        for position, boundary in enumerate(record.boundaries)
-        if (name := _write_image(folder, boundary)) is not None
-    }
-    data = record_json(record, page=page, images=images)
+    boundaries = tuple(_stored(folder, b) for b in record.boundaries)
+    data = record_to_json(replace(record, boundaries=boundaries), page=page)
     path = folder / RECORD_NAME
     replace_file(path, _by_line(data).encode("utf-8"))
     return path
 
 
-def read_record(path: Path | str) -> dict[str, Any]:
+def read_record(path: Path | str) -> EpisodeRecord:
     """Read the record of a run, finished or killed.
 
     Args:
         path: the run's folder, its `record.json` or its `boundaries.jsonl`.
 
     Returns:
-        What `record_json` made. A run that was killed has `complete` False, `end` None and what
-        had been written until then; what only the end knows is None.
+        The record; observations are by reference, their pictures files of the folder. A run that
+        was killed has the end `UNFINISHED` and what had been written until then; what only the end
+        knows is None.
 
     Raises:
-        FileFormatError: no record there, an empty or truncated file, another format version.
+        FileFormatError: no record there, an empty or damaged file, another format version; with
+            the file and the place in it.
     """
     path = Path(path)
     if path.is_dir():
@@ -182,19 +175,12 @@ def read_record(path: Path | str) -> dict[str, Any]:
         raise FileFormatError(f"{path} is not the record of a run: it is not text") from error
     if not text.strip():
         raise FileFormatError(f"{path} is empty: not the record of a run")
-    if path.suffix == ".jsonl":
-        return _read_lines(path, text)
     try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise FileFormatError(
-            f"{path} is damaged or truncated (line {error.lineno}): {error.msg}"
-        ) from error
-    _check_header(path, data)
-    missing = sorted({"task", "end", "boundaries", "executed", "alarms"} - data.keys())
-    if missing:
-        raise FileFormatError(f"{path} lacks {', '.join(missing)}")
-    return dict(data)
+        if path.suffix == ".jsonl":
+            return _read_lines(text)
+        return record_from_json(load_json(text))
+    except FileFormatError as error:
+        raise FileFormatError(f"{path}: {error}") from error
 
 
 def replace_file(path: Path, data: bytes) -> None:
@@ -211,15 +197,20 @@ def replace_file(path: Path, data: bytes) -> None:
         raise
 
 
-def _write_image(folder: Path, boundary: BoundaryRecord) -> str | None:
-    if boundary.observation is None:
-        return None
-    data = encode_jpeg(boundary.observation.frames[-1].rgb)
-    path = folder / IMAGES_NAME / file_name(data)
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(path, data)
-    return f"{IMAGES_NAME}/{path.name}"
+def _stored(folder: Path, boundary: BoundaryRecord) -> BoundaryRecord:
+    """A boundary whose pictures are files of the folder."""
+    seen = boundary.observation
+    if not isinstance(seen, Observation):
+        return boundary
+    pictures = []
+    for frame in seen.frames:
+        data = encode_jpeg(frame.rgb)
+        path = folder / IMAGES_NAME / file_name(data)
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(path, data)
+        pictures.append(f"{IMAGES_NAME}/{path.name}")
+    return replace(boundary, observation=by_reference(seen, pictures))
 
 
 def _dumps(value: Any) -> str:
@@ -237,73 +228,52 @@ def _by_line(data: Mapping[str, Any]) -> str:
     return "{\n" + ",\n".join(rows) + "\n}\n"
 
 
-def _check_header(path: Path, data: Any) -> None:
-    if not isinstance(data, dict) or data.get("kind") != KIND:
-        raise FileFormatError(f"{path} is not the record of a run")
-    if data.get("format") != RECORD_FORMAT:
-        raise FileFormatError(
-            f"{path} has record format {data.get('format')!r}: this version reads {RECORD_FORMAT}"
-        )
-
-
-def _read_lines(path: Path, text: str) -> dict[str, Any]:
+def _read_lines(text: str) -> EpisodeRecord:
+    """A record from what had been written when the run was killed."""
     rows = text.split("\n")
-    events: list[dict[str, Any]] = []
+    events: list[Field] = []
     for number, row in enumerate(rows, 1):
         if not row:
             continue
         try:
-            events.append(json.loads(row))
-        except json.JSONDecodeError as error:
+            events.append(Field(load_json(row), f"line {number}"))
+        except FileFormatError as error:
             if number == len(rows):  # the line that was being written when the run was killed
                 break
-            raise FileFormatError(f"{path} is damaged at line {number}: {error.msg}") from error
+            raise FileFormatError(f"damaged at line {number}: {error}") from error
     if not events:
-        raise FileFormatError(f"{path} ends before its first line does: nothing of the run is left")
-    start = events[0]
-    _check_header(path, start)
-    return _unfinished(start, events[1:])
+        raise FileFormatError("it ends before its first line does: nothing of the run is left")
+    check_header(events[0].value)
+    return _unfinished(events[0].value, events[1:])
 
 
-def _unfinished(start: Mapping[str, Any], events: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    boundaries = [e["boundary"] for e in events if e.get("event") == "boundary"]
-    compute: dict[str, float] = {}
-    for boundary in boundaries:
-        for phase, seconds in boundary["seconds"].items():
-            compute[phase] = compute.get(phase, 0.0) + seconds
-    times = [b["time_s"] for b in boundaries]
-    times += [e["time_s"] for e in events if e.get("event") == "executed"]
-    simulated, reasoning = max(times, default=0.0), reasoning_s(compute.items())
-    known = start.get("provenance") or {}
-    names = ("task", "title", "goal", "scenario", "strategy", "seed")
-    return {
-        "kind": KIND,
-        "format": RECORD_FORMAT,
-        "complete": False,
-        **{name: start.get(name) for name in names},
-        "success": None,
-        "weak_success": None,
-        "failures": [],
-        "alarms": [e["alarm"] for e in events if e.get("alarm")],
-        "replans": sum(b["plan_after"] is not None for b in boundaries),
-        "initial_plan": start.get("initial_plan", []),
-        "executed": [e["executed"] for e in events if e.get("event") == "executed"],
-        "end": None,
-        "simulated_s": simulated,
-        "compute_s": compute,
-        "computed_s": sum(compute.values()),
-        "reasoning_s": reasoning,
-        "total_s": simulated + reasoning,
-        "perception": {
-            "segmenter": None,
-            "state_estimator": None,
-            **(known.get("perception") or {}),
-        },
-        "memory": known.get("memory"),
-        "versions": known.get("versions") or {},
-        "provenance": known,
-        "page": None,
-        "events": [],
-        "boundaries": boundaries,
-        "final": None,
-    }
+def _unfinished(start: Mapping[str, Any], events: Sequence[Field]) -> EpisodeRecord:
+    boundaries: list[Any] = []
+    executed: list[Any] = []
+    simulated_s, compute_s = 0.0, {}
+    for event in events:
+        what = event["event"].text()
+        if what == "boundary":
+            boundary = event["boundary"]
+            simulated_s = max(simulated_s, boundary["time_s"].number())
+            compute_s = dict(boundary["compute_s"].pairs(Field.number))
+            boundaries.append(boundary.value)
+        elif what == "executed":
+            simulated_s = max(simulated_s, event["time_s"].number())
+            executed.append(event["executed"].value)
+    return record_from_json(
+        {
+            **start,
+            "success": None,
+            "weak_success": None,
+            "failures": [],
+            "executed": executed,
+            "end": None,
+            "simulated_s": simulated_s,
+            "compute_s": compute_s,
+            "events": [],
+            "harmed": [],
+            "boundaries": boundaries,
+            "final": None,
+        }
+    )

@@ -1,4 +1,4 @@
-"""The page of a run: one HTML file that needs nothing but itself.
+"""The page of a run: one HTML file that needs nothing but itself, drawn from its record.
 
 Calls: `write_page` → `page_view.py` (what is shown) → `graph_svg.py`, `pictures.py`; the template
 escapes every text. The same record gives the same bytes.
@@ -19,8 +19,8 @@ from forestall.report.page_view import duration, page_view, status_sign
 from forestall.types.episode import EpisodeRecord
 
 
-def page_html(record: EpisodeRecord) -> str:
-    """The page of a finished run as text."""
+def page_html(record: EpisodeRecord, folder: Path | None = None) -> str:
+    """The page of a run as text; `folder` is where the pictures of a record lie that was read."""
     environment = Environment(
         loader=PackageLoader("forestall.report"),
         autoescape=True,
@@ -33,28 +33,32 @@ def page_html(record: EpisodeRecord) -> str:
     environment.filters["sign"] = status_sign
     environment.filters["in_words"] = in_words
     environment.filters["svg"] = Markup  # graph_svg escapes its own texts
-    folder = files("forestall.report").joinpath("templates")
-    style = folder.joinpath("page.css").read_text(encoding="utf-8")
-    script = folder.joinpath("page.js").read_text(encoding="utf-8")
+    templates = files("forestall.report").joinpath("templates")
+    style = templates.joinpath("page.css").read_text(encoding="utf-8")
+    script = templates.joinpath("page.js").read_text(encoding="utf-8")
     return environment.get_template("page.html.jinja").render(
-        page=page_view(record),
+        page=page_view(record, folder),
         record=record,
         style=Markup(style + graph_css()),
         script=Markup(script),
     )
 
 
-def write_page(record: EpisodeRecord, path: Path | str) -> Path:
-    """Write the page of a finished run.
+def write_page(record: EpisodeRecord, path: Path | str, folder: Path | None = None) -> Path:
+    """Write the page of a run, finished or killed.
 
     Args:
         record: pictures come from its observations; where there are none the page says so.
         path: the HTML file; its folder is made when it is not there.
+        folder: of a record that was read from one; its pictures are there.
 
     Returns:
         The path.
+
+    Raises:
+        FileFormatError: a picture of the folder is none.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(path, page_html(record).encode("utf-8"))
+    replace_file(path, page_html(record, folder).encode("utf-8"))
     return path

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from forestall.records.as_json import plain
 from forestall.records.derived import (
     SIMULATOR_PHASES,
     Alarm,
@@ -24,9 +24,10 @@ from forestall.records.derived import (
     provenance_of,
     reasoning_s,
 )
-from forestall.records.pictures import Picture, page_picture
+from forestall.records.pictures import Picture, page_picture, rgb_of
+from forestall.records.plain import plain
 from forestall.report.graph_svg import graph_svg
-from forestall.types.episode import EpisodeRecord, SkillStatus
+from forestall.types.episode import EpisodeRecord, SkillStatus, StoredObservation
 from forestall.types.observation import Observation
 from forestall.types.runtime import When
 from forestall.types.verdict import Verdict
@@ -103,7 +104,7 @@ class Page:
     provenance: tuple[tuple[str, str], ...]
 
 
-def page_view(record: EpisodeRecord) -> Page:
+def page_view(record: EpisodeRecord, folder: Path | None) -> Page:
     """Everything that the template needs."""
     all_moments = moments(record)
     frames = sum(
@@ -112,7 +113,7 @@ def page_view(record: EpisodeRecord) -> Page:
         if m.boundary is not None and m.boundary.observation is not None
     )
     budget = int(_PICTURES_BYTES / max(10.0, frames))
-    cards = tuple(_card(record, i, m, budget) for i, m in enumerate(all_moments, 1))
+    cards = tuple(_card(record, i, m, budget, folder) for i, m in enumerate(all_moments, 1))
     perception = provenance_of(record, "perception")
     states = str(perception.get("state_estimator") or "not recorded")
     longest = max((s for _, s in record.compute_s), default=0.0) or 1.0
@@ -149,12 +150,14 @@ def _legend(found: Sequence[Moment]) -> tuple[tuple[str, str, str, int], ...]:
     return tuple((*LOOKS[mark], mark.value, n) for mark, n in counts.items() if n)
 
 
-def _card(record: EpisodeRecord, number: int, moment: Moment, budget: int) -> Card:
+def _card(
+    record: EpisodeRecord, number: int, moment: Moment, budget: int, folder: Path | None
+) -> Card:
     look, sign = LOOKS[moment.mark]
     boundary = moment.boundary
     verdict = None if boundary is None else boundary.verdict
     observation = None if boundary is None else boundary.observation
-    picture, views, thumb = _pictures(observation, budget)
+    picture, views, thumb = _pictures(observation, budget, folder)
     bars, threshold = _bars(verdict)
     observed, expected = _graphs(moment)
     outcome = None if boundary is None else outcome_of(boundary)
@@ -188,15 +191,19 @@ def _verb(moment: Moment) -> str:
 
 
 def _pictures(
-    observation: Observation | None, budget: int
+    observation: Observation | StoredObservation | None, budget: int, folder: Path | None
 ) -> tuple[Picture | None, tuple[Picture, ...], Picture | None]:
     if observation is None:
         return None, (), None
-    *others, newest = observation.frames
+    *others, newest = (rgb_of(frame, folder) for frame in observation.frames)
+    if newest is None:
+        return None, (), None
     thumb = page_picture(newest, width=THUMB_WIDTH, budget_bytes=max(3000, budget // 8))
     picture = page_picture(newest, width=PICTURE_WIDTH, budget_bytes=budget)
     views = tuple(
-        page_picture(f, width=VIEW_WIDTH, budget_bytes=budget // 4) for f in others[-_MAX_VIEWS:]
+        page_picture(rgb, width=VIEW_WIDTH, budget_bytes=budget // 4)
+        for rgb in others[-_MAX_VIEWS:]
+        if rgb is not None
     )
     return picture, views, thumb
 

@@ -14,9 +14,9 @@ from forestall.domain.model import Domain
 from forestall.planning.validate import GraphValidator
 from forestall.seams import OracleView
 from forestall.strategies.intervention import rest_of
-from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
-from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
+from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
+from forestall.types.plan import Plan
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.task import Goal, Task
 
 
@@ -61,14 +61,14 @@ class TruthTrace:
         """Forget an earlier run."""
         self.moments.clear()
 
-    def on_boundary(self, context: BoundaryContext, answer: StrategyAnswer) -> None:
+    def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """Look at the truth."""
         assert self._look is not None, "attach() comes first"
         self.moments.append(self._look(context))
 
-    def on_executed(self, subtask: Subtask, outcome: SkillOutcome, time_s: float) -> None:
+    def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A refused subtask is still to be done."""
-        self._succeeded = outcome.status is SkillStatus.SUCCEEDED
+        self._succeeded = executed.outcome.status is SkillStatus.SUCCEEDED
 
     def on_end(self, record: EpisodeRecord) -> None:
         """Nothing to look at."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from forestall.types.decision import Outcome
 from forestall.types.graph import SceneGraph
-from forestall.types.observation import Observation, Vec3
+from forestall.types.observation import GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import When
 from forestall.types.task import Task
@@ -43,14 +44,41 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class StoredFrame:
+    """One picture of a stored observation.
+
+    `camera_to_world` has the rows of the (4, 4) pose. `picture` is the path of the picture relative
+    to the folder of the record, None where it was not kept.
+    """
+
+    intrinsics: Intrinsics
+    camera_to_world: tuple[tuple[float, ...], ...]
+    picture: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StoredObservation:
+    """An observation by reference: where the cameras stood, and which files hold the pictures."""
+
+    frames: tuple[StoredFrame, ...]
+    gripper: GripperState
+    time_s: float
+    robot_position_world_m: Vec3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class BoundaryRecord:
-    """One subtask boundary: what was seen, judged and decided before the subtask."""
+    """One subtask boundary: what was seen, judged and decided before the subtask.
+
+    `seconds` is the measured time that this boundary took, `compute_s` that of the run until it was
+    decided, both by phase.
+    """
 
     index: int  # position among all boundaries
     subtask: Subtask  # as grounded
     graph: SceneGraph  # whole fused graph
     scoped: SceneGraph  # what concerns the subtask
-    observation: Observation | None
+    observation: Observation | StoredObservation | None
     looks: int
     verdict: Verdict | None
     diagnosis: Diagnosis | None = None
@@ -62,6 +90,8 @@ class BoundaryRecord:
         When.BEFORE
     )  # of the subtask: judged before it, after it, or at the end of the plan
     watched: tuple[Verdict, ...] = ()  # what further detectors said of the same observation
+    outcome: Outcome | None = None  # what the monitor decided
+    compute_s: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +111,7 @@ class EpisodeEnd(Enum):
     REPLAN_LIMIT = "replan limit"  # a further plan was asked for than may be adopted
     STOPPED = "stopped safely"
     ERROR = "error"
+    UNFINISHED = "unfinished"  # the record breaks off: the run was killed, or is not over
 
 
 @dataclass(frozen=True, slots=True)

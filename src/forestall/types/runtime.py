@@ -1,4 +1,4 @@
-"""What the episode loop hands to a strategy, and what it gets back."""
+"""What the monitor hands to a strategy, and what it gets back."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class BoundaryContext:
         subtask: that subtask, grounded to instance names where they are known.
         graph: the whole fused scene graph.
         scoped: the part that concerns the subtask.
-        observation: the newest observation.
+        observation: the newest observation, None where a scene graph alone was given.
         references: retrieved demonstrations (filled by strategies that use them).
         looks: how many times the robot looked at this boundary (1 at first).
         may_look: whether it may look once more.
@@ -57,7 +57,7 @@ class BoundaryContext:
     subtask: Subtask
     graph: SceneGraph
     scoped: SceneGraph
-    observation: Observation
+    observation: Observation | None
     references: tuple[Reference, ...] = ()
     looks: int = 1
     may_look: bool = True

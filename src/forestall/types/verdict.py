@@ -114,6 +114,11 @@ class Verdict:
     references: int = 0
     note: str = ""
 
+    @property
+    def judged(self) -> bool:
+        """Whether anything was compared or checked; without a reference nothing is."""
+        return self.score is not None or self.calibration is not Calibration.UNCALIBRATED
+
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:

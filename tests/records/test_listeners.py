@@ -1,17 +1,15 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
 from forestall.records.listeners import ProgressLine
-from forestall.seams import Listener
-from forestall.types.episode import EpisodeRecord, SkillOutcome, SkillStatus
-from forestall.types.runtime import StrategyAnswer, When
-from forestall.types.verdict import Decision
-
-from . import records
+from forestall.types.decision import Outcome
+from forestall.types.episode import EpisodeRecord, ExecutedRecord, SkillOutcome, SkillStatus
+from report import records
 
 
 class Clock:
@@ -25,21 +23,10 @@ class Clock:
         return self.now_s
 
 
-def follow(listener: Listener, record: EpisodeRecord) -> None:
-    listener.on_start(record.task, record.initial_plan, record.seed)
-    executed = {e.index: e for e in record.executed}
-    for context, answer in records.calls(record):
-        listener.on_boundary(context, answer)
-        if context.when is When.BEFORE and context.done in executed:
-            step = executed[context.done]
-            listener.on_executed(step.subtask, step.outcome, 4.0 * step.index + 4)
-    listener.on_end(record)
-
-
 def written(record: EpisodeRecord, *, terminal: bool = False, quiet: bool = False) -> str:
     file = io.StringIO()
     console = Console(file=file, force_terminal=terminal, width=140, highlight=False)
-    follow(ProgressLine(console, quiet=quiet, clock=Clock()), record)
+    records.follow(ProgressLine(console, quiet=quiet, clock=Clock()), record)
     return file.getvalue()
 
 
@@ -78,7 +65,8 @@ def test_names_are_not_read_as_markup_and_failures_are_said() -> None:
     file = io.StringIO()
     line = ProgressLine(Console(file=file, width=100), clock=Clock())
     line.on_start(record.task, record.initial_plan, 0)
-    line.on_executed(odd, SkillOutcome(SkillStatus.SUCCEEDED, 1.0), 1.0)
+    done = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)
+    line.on_executed(ExecutedRecord(odd, done, 0), 1.0)
     assert "[red]Mug[/red]" in file.getvalue()
 
 
@@ -87,8 +75,8 @@ def test_stopping_is_said_with_its_reason() -> None:
     line = ProgressLine(Console(file=file, width=100), clock=Clock())
     record = records.potato_record()
     line.on_start(record.task, record.initial_plan, 0)
-    (context, _), *_ = records.calls(record)
-    line.on_boundary(context, StrategyAnswer(Decision.STOP, why="no plan works"))
+    (boundary, context), *_ = records.calls(record)
+    line.on_boundary(replace(boundary, outcome=Outcome.HOLD, why="no plan works"), context)
     assert "stopped before navigate_to_obj(Potato): no plan works" in file.getvalue()
 
 
@@ -103,7 +91,7 @@ def test_a_run_that_raises_gives_the_terminal_back() -> None:
 
 
 def test_it_writes_to_standard_error(capfd: pytest.CaptureFixture[str]) -> None:
-    follow(ProgressLine(), records.potato_record())
+    records.follow(ProgressLine(), records.potato_record())
     out, err = capfd.readouterr()
     assert out == ""
     assert "heat-potato succeeded" in err

@@ -14,8 +14,7 @@ from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import When
 from forestall.types.verdict import Decision
-
-from . import records
+from report import records
 
 
 def test_moments_follow_the_run_and_track_the_plan() -> None:

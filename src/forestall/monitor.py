@@ -1,0 +1,342 @@
+"""The monitor: an observation in, a decision out. It knows no environment.
+
+Whoever owns the robot calls it: the episode loop (`runtime.py`), a replay of stored data, an
+executive of the user's own. It calls perceiver and strategy, which come through the constructor;
+where the run stands is in `run_state.py`, what an answer comes to in `conclusion.py`. An exception
+in a part comes out as the error that it is.
+
+    monitor.start(task)
+    monitor.observe(first_look)
+    decision = monitor.before(observation)  # proceed · look · replan · hold · not judged
+    if decision.may_start:
+        monitor.after(robot.execute(decision.command))
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from forestall.conclusion import MonitorConfig, conclude
+from forestall.errors import InputError
+from forestall.records.boundary import boundary_record
+from forestall.run_state import RunState
+from forestall.types.decision import Hold, MonitorDecision, Outcome
+from forestall.types.episode import ExecutedRecord, SkillOutcome
+from forestall.types.facts import GRIPPER
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation, Vec3
+from forestall.types.plan import Plan, Subtask
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
+from forestall.types.scene import SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import Decision
+
+if TYPE_CHECKING:
+    from forestall.domain.model import Domain
+    from forestall.seams import Perceiver, Strategy
+
+
+class Monitor:
+    """Judges one run, boundary by boundary.
+
+    Args:
+        strategy: says what is to be done about a scene.
+        domain: resolves names.
+        perceiver: turns observations into the scene graph; None where scene graphs are given.
+        config: bounds and policies.
+        scope: the part of a graph that concerns a subtask; the perceiver's own by default, without
+            one the whole graph.
+    """
+
+    def __init__(
+        self,
+        strategy: Strategy,
+        domain: Domain,
+        perceiver: Perceiver | None = None,
+        config: MonitorConfig | None = None,
+        scope: Callable[[SceneGraph, Subtask], SceneGraph] | None = None,
+    ) -> None:
+        self._strategy = strategy
+        self._domain = domain
+        self._perceiver = perceiver
+        self._config = config or MonitorConfig()
+        self._scope = scope or (_whole if perceiver is None else perceiver.scope)
+        self._state: RunState | None = None
+        self._awaited: tuple[BoundaryContext, SkillOutcome] | None = None  # a look after it
+
+    def start(self, task: Task | Plan, plan: Plan | None = None) -> None:
+        """A run begins; everything of an earlier one is forgotten.
+
+        Args:
+            task: goal and names; a plan alone is a task without a goal condition.
+            plan: the plan to start with, the task's own by default.
+        """
+        if isinstance(task, Plan):
+            task = Task(task.goal, task.goal, Goal(task.goal), task, SceneNeeds())
+        first = task.plan if plan is None else plan
+        self._state = RunState(task, first, self._domain, first)
+        self._awaited = None
+        if self._perceiver is not None:
+            self._perceiver.reset()
+
+    def observe(self, observation: Observation | SceneGraph) -> None:
+        """The first look around: it is remembered, nothing is judged."""
+        with self._run.phase("perceive"):
+            self._see(observation)
+        self._run.mark()
+
+    def before(
+        self, observation: Observation | SceneGraph, subtask: Subtask | str | None = None
+    ) -> MonitorDecision:
+        """May the next subtask start?
+
+        Args:
+            observation: RGB-D with the robot's own state, or a scene graph.
+            subtask: which one; by default the plan's next. What lies between is skipped.
+
+        Raises:
+            InputError: not started, the plan is finished, or the subtask is not in what is left.
+        """
+        run = self._run
+        run.move_to(subtask)
+        if self.exhausted:
+            why = f"{len(run.executed)} subtasks were executed, and no more may be"
+            limit = Hold.SUBTASK_LIMIT
+            return MonitorDecision(Outcome.HOLD, False, run.ground(), hold=limit, why=why)
+        self._awaited, run.ready = None, False
+        return self._judge(
+            When.BEFORE, run.position, None, observation, self._strategy.before_subtask
+        )
+
+    def after(
+        self, outcome: SkillOutcome, observation: Observation | SceneGraph | None = None
+    ) -> MonitorDecision | None:
+        """The subtask is over; a refusal is evidence that names were bound wrongly.
+
+        Args:
+            outcome: how it ended, as the robot knows it.
+            observation: what is seen now. A strategy that judges after subtasks answers "look"
+                where it is None, and is then asked again with the same outcome.
+
+        Returns:
+            None where there is nothing to say.
+
+        Raises:
+            InputError: nothing was judged before.
+        """
+        run = self._run
+        if self._awaited is None:
+            run.note_executed(outcome)
+            run.mark()
+            assert run.last is not None
+            told = replace(outcome, reason="")  # it may name what the robot has not seen
+            if self._strategy.looks_after is not LooksAfter.SUBTASK:
+                answer = self._strategy.after_subtask(run.last, told)
+                silent = answer.decision is Decision.PROCEED and answer.verdict is None
+                over = replace(run.last, when=When.AFTER, may_look=False)
+                return None if silent else self._conclude(over, answer)
+            self._awaited = (run.last, told)
+        context, told = self._awaited
+        if observation is None:
+            return self._look(context.subtask, "what a subtask has led to is judged")
+        decision = self._judge(
+            When.AFTER,
+            context.index,
+            context.subtask,
+            observation,
+            lambda seen: self._strategy.after_subtask(seen, told),
+        )
+        if decision.outcome is not Outcome.LOOK:
+            self._awaited = None
+        return decision
+
+    def finish(self, observation: Observation | SceneGraph | None = None) -> MonitorDecision:
+        """The plan is finished: is the task?
+
+        Args:
+            observation: what is seen now. A strategy that judges the end answers "look" where it is
+                None.
+
+        Raises:
+            InputError: the plan is not finished.
+        """
+        run = self._run
+        if not run.finished:
+            raise InputError(f"the plan is not finished: {run.plan.subtasks[run.position]} is next")
+        last = run.last
+        if last is None:
+            may = self._config.on_not_judged == "proceed"
+            return MonitorDecision(Outcome.NOT_JUDGED, may, why="nothing was executed")
+        if observation is None:
+            if self._strategy.looks_after is not LooksAfter.NOTHING:
+                return self._look(last.subtask, "what the plan has led to is judged")
+            answer = self._strategy.after_episode(last)
+            return self._conclude(replace(last, when=When.END, may_look=False), answer)
+        decision = self._judge(
+            When.END, len(run.plan), last.subtask, observation, self._strategy.after_episode
+        )
+        run.final = run.graph
+        return decision
+
+    @property
+    def finished(self) -> bool:
+        """Whether the plan has no further subtask."""
+        return self._run.finished
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether as many subtasks were executed as may be."""
+        return len(self._run.executed) >= self._config.max_subtasks
+
+    @property
+    def looks_after(self) -> LooksAfter:
+        """After what the strategy wants the robot to look where it has just worked."""
+        return self._strategy.looks_after
+
+    @property
+    def plan(self) -> Plan:
+        """The plan at hand."""
+        return self._run.plan
+
+    @property
+    def executed(self) -> tuple[ExecutedRecord, ...]:
+        """What was tried, and how each subtask ended."""
+        return tuple(self._run.executed)
+
+    @property
+    def last(self) -> Subtask | None:
+        """The newest subtask that was judged before it started, None where none was yet."""
+        context = self._run.last
+        return None if context is None else context.subtask
+
+    @property
+    def bound(self) -> dict[str, str]:
+        """Category → the instance that it means by now."""
+        return dict(self._run.bound)
+
+    @property
+    def graph(self) -> SceneGraph:
+        """Everything that is believed now."""
+        return self._run.graph
+
+    @property
+    def final(self) -> SceneGraph | None:
+        """What was known at the end of the plan, None where nobody looked."""
+        return self._run.final
+
+    @property
+    def seconds(self) -> tuple[tuple[str, float], ...]:
+        """Measured time of the run by phase."""
+        return tuple(sorted(self._run.seconds.items()))
+
+    @property
+    def command(self) -> Subtask | None:
+        """The subtask to send to the robot next, as far as names can be told."""
+        run = self._run
+        return None if run.finished else run.command(run.ground(), run.position)
+
+    def wanted_views(self) -> tuple[Vec3, ...]:
+        """World points to look at: where the hand let go last, the arguments that it does not hold.
+
+        Of the next subtask; of the last one while a look after it is asked for, and at the end.
+        """
+        run = self._run
+        if self._awaited is not None:
+            return run.views(self._awaited[0].subtask)
+        if not run.finished:
+            return run.views(run.ground())
+        return () if run.last is None else run.views(run.last.subtask)
+
+    def approach(self) -> str | None:
+        """What to drive to before looking: where the next subtask will be done, None for nothing.
+
+        A skill whose target is out of reach drives there by itself; doing that first lets the
+        decision be taken on what can be seen at the place and not from across the room.
+        """
+        return None if self._run.finished else self._run.approach()
+
+    def phase(self, name: str) -> AbstractContextManager[None]:
+        """Book the caller's own time (driving, looking) to the boundary that is judged next."""
+        return self._run.phase(name)
+
+    @property
+    def _run(self) -> RunState:
+        if self._state is None:
+            raise InputError("the monitor was not started: call start(task) first")
+        return self._state
+
+    def _see(self, observation: Observation | SceneGraph) -> None:
+        run = self._run
+        if isinstance(observation, SceneGraph):
+            run.graph = replace(observation, subtask=None)
+            hand = observation.get(GRIPPER)
+            if hand is not None and hand.centroid_m is not None:
+                run.robot_world_m = hand.centroid_m
+            return
+        if self._perceiver is None:
+            raise InputError("this monitor has no perceiver: give it a scene graph")
+        run.graph = self._perceiver.perceive(observation)
+        run.robot_world_m = observation.robot_position_world_m
+        run.time_s = observation.time_s
+
+    def _judge(
+        self,
+        when: When,
+        index: int,
+        subtask: Subtask | None,
+        observation: Observation | SceneGraph,
+        ask: Callable[[BoundaryContext], StrategyAnswer],
+    ) -> MonitorDecision:
+        """One look of one moment: fuse, ask the strategy, conclude, record."""
+        run = self._run
+        with run.phase("perceive"):
+            self._see(observation)
+            picture = None if isinstance(observation, SceneGraph) else observation
+            subtask = run.ground() if subtask is None else subtask
+            looks = self._config.max_looks
+            context = run.context(when, index, subtask, self._scope, picture, looks)
+        started = time.perf_counter()
+        answer = ask(context)
+        spent = time.perf_counter() - started
+        for name, seconds in answer.seconds:
+            run.book(name, seconds)
+        run.book("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
+        number = run.boundary - (when is When.AFTER)
+        decision = self._conclude(context, answer)
+        record = boundary_record(
+            number, context, answer, decision.outcome, run.since, run.seconds, run.time_s
+        )
+        run.mark()
+        if when is When.BEFORE:
+            run.last, run.ready = context, decision.outcome is not Outcome.REPLAN
+        if decision.outcome is Outcome.LOOK:
+            run.looks = context.looks
+        else:
+            run.looks = 0
+            run.boundary += when is not When.AFTER
+        return replace(decision, context=context, record=record, seconds=record.seconds)
+
+    def _conclude(self, context: BoundaryContext, answer: StrategyAnswer) -> MonitorDecision:
+        """What a strategy's answer comes to; a new plan is adopted here."""
+        run = self._run
+        decision = conclude(context, answer, self._config, self._strategy.name)
+        if decision.plan is not None:
+            run.adopt(decision.plan)
+            self._awaited = None
+        elif decision.outcome is Outcome.LOOK:
+            return replace(decision, look_at=run.views(context.subtask))
+        elif context.when is When.BEFORE:
+            return replace(decision, command=run.command(context.subtask, context.index))
+        return decision
+
+    def _look(self, subtask: Subtask, why: str) -> MonitorDecision:
+        views = self._run.views(subtask)
+        return MonitorDecision(Outcome.LOOK, False, subtask, look_at=views, why=why)
+
+
+def _whole(graph: SceneGraph, subtask: Subtask) -> SceneGraph:
+    return replace(graph, subtask=subtask)

@@ -1,0 +1,179 @@
+"""Reading JSON that may be anything: every value knows its place, every error names it.
+
+Used by the codec; calls nothing. What is wrong is a `FileFormatError` such as
+"boundaries[3].verdict.score: a number is expected, got 'high'".
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, NoReturn, TypeVar
+
+from forestall.errors import FileFormatError, ForestallError
+from forestall.types.observation import Vec3
+
+T = TypeVar("T")
+E = TypeVar("E", bound=Enum)
+
+MAX_DEPTH = 64
+"""How deep lists and objects of a record may nest; ours are at most twelve deep."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One value of a JSON document, and where it stands."""
+
+    value: Any
+    place: str = ""
+
+    def fail(self, expected: str) -> NoReturn:
+        """Say what was expected here.
+
+        Raises:
+            FileFormatError: always.
+        """
+        found = repr(self.value)
+        found = found if len(found) <= 60 else f"{found[:57]}..."
+        raise FileFormatError(f"{self._name()}: {expected} is expected, got {found}")
+
+    def __getitem__(self, key: str) -> Field:
+        found = self.find(key)
+        if found is None:
+            raise FileFormatError(f"{self._name()} lacks {key!r}")
+        return found
+
+    def find(self, key: str) -> Field | None:
+        """The value under a key, None where the key is not there."""
+        if not isinstance(self.value, dict):
+            self.fail("an object")
+        if key not in self.value:
+            return None
+        return Field(self.value[key], f"{self.place}.{key}" if self.place else key)
+
+    def maybe(self, key: str, read: Callable[[Field], T]) -> T | None:
+        """What is under a key, None where that is null."""
+        field = self[key]
+        return None if field.value is None else read(field)
+
+    def items(self) -> list[Field]:
+        """The elements of a list."""
+        if not isinstance(self.value, list):
+            self.fail("a list")
+        return [Field(v, f"{self.place}[{i}]") for i, v in enumerate(self.value)]
+
+    def tuple_of(self, read: Callable[[Field], T]) -> tuple[T, ...]:
+        """Every element of a list, read."""
+        return tuple(read(f) for f in self.items())
+
+    def pairs(self, read: Callable[[Field], T]) -> tuple[tuple[str, T], ...]:
+        """Every entry of an object, in order."""
+        if not isinstance(self.value, dict):
+            self.fail("an object")
+        return tuple((k, read(Field(v, f"{self.place}.{k}"))) for k, v in self.value.items())
+
+    def text(self) -> str:
+        """A text."""
+        if not isinstance(self.value, str):
+            self.fail("a text")
+        return self.value
+
+    def flag(self) -> bool:
+        """True or false."""
+        if not isinstance(self.value, bool):
+            self.fail("true or false")
+        return self.value
+
+    def whole(self) -> int:
+        """A whole number from 0 on."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int) or self.value < 0:
+            self.fail("a whole number from 0 on")
+        return self.value
+
+    def number(self) -> float:
+        """A finite number."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+            self.fail("a number")
+        try:
+            number = float(self.value)
+        except OverflowError:
+            self.fail("a number")
+        if not math.isfinite(number):
+            self.fail("a finite number")
+        return number
+
+    def vector(self) -> Vec3:
+        """Three numbers."""
+        numbers = self.tuple_of(Field.number)
+        if len(numbers) != 3:
+            self.fail("three numbers")
+        return (numbers[0], numbers[1], numbers[2])
+
+    def member(self, kind: type[E]) -> E:
+        """A member of an enumeration, by its value."""
+        try:
+            return kind(self.text())
+        except ValueError:
+            self.fail(f"one of {', '.join(repr(m.value) for m in kind)}")
+
+    def parsed(self, parse: Callable[[Any], T]) -> T:
+        """What a parser of ours makes of the value; its complaint gets the place."""
+        try:
+            return parse(self.value)
+        except ForestallError as error:
+            raise FileFormatError(f"{self._name()}: {error}") from error
+        except (ValueError, TypeError, AttributeError, LookupError, ArithmeticError) as error:
+            raise FileFormatError(f"{self._name()} cannot be read: {error}") from error
+
+    def _name(self) -> str:
+        return self.place or "the record"
+
+
+def load_json(text: str) -> Any:
+    """Parse a JSON document of finite depth, numbers and characters that can be written again.
+
+    Raises:
+        FileFormatError: it is none.
+    """
+    try:
+        data = json.loads(text, parse_constant=_no_constant)
+    except json.JSONDecodeError as error:
+        raise FileFormatError(f"damaged or truncated (line {error.lineno}): {error.msg}") from error
+    except RecursionError as error:
+        raise FileFormatError("damaged: it nests too deeply") from error
+    except ValueError as error:
+        raise FileFormatError(f"damaged: {error}") from error
+    if "\\u" in text:
+        _check_characters(data)
+    _check_depth(data)
+    return data
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number in JSON")
+
+
+def _check_characters(data: Any) -> None:
+    try:
+        json.dumps(data, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise FileFormatError("damaged: it has half of a character") from error
+    except RecursionError as error:
+        raise FileFormatError("damaged: it nests too deeply") from error
+
+
+def _check_depth(data: Any) -> None:
+    level = [data]
+    for _ in range(MAX_DEPTH):
+        level = [
+            inner
+            for value in level
+            if isinstance(value, dict | list)
+            for inner in (value.values() if isinstance(value, dict) else value)
+        ]
+        if not level:
+            return
+    raise FileFormatError(f"damaged: it nests more than {MAX_DEPTH} deep")

@@ -1,0 +1,203 @@
+"""Where a run stands: plan and position, what is believed, what names mean, time spent.
+
+Owned and changed by the monitor only; calls name resolution (`grounding.py`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from forestall.domain.names import executable, ground_subtask
+from forestall.errors import InputError
+from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
+from forestall.types.facts import category_of, is_instance
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation, Vec3
+from forestall.types.plan import Plan, Subtask, same_step
+from forestall.types.runtime import BoundaryContext, When
+from forestall.types.task import Task
+
+if TYPE_CHECKING:
+    from forestall.domain.model import Domain
+
+
+@dataclass(slots=True)
+class RunState:
+    """What changes while one run goes on.
+
+    Args:
+        task: goal and names.
+        first_plan: the plan that the run started with.
+        domain: resolves names.
+        plan: the plan at hand.
+        position: in it, of the subtask that comes next.
+        replans: how many plans were adopted.
+        looks: taken at the boundary that is open, 0 where none is.
+        boundary: how many boundaries are over.
+        ready: whether the newest subtask that was judged may be reported as executed.
+        last: what was known before it.
+        bound: category → the instance that it means.
+        executed: what was tried.
+        graph: everything that is believed.
+        robot_world_m: where the robot stands.
+        worked_at: where the hand let go last.
+        time_s: of the robot's clock.
+        seconds: measured time by phase; `since` is the same when the boundary began.
+    """
+
+    task: Task
+    first_plan: Plan
+    domain: Domain
+    plan: Plan
+    position: int = 0
+    replans: int = 0
+    looks: int = 0
+    boundary: int = 0
+    ready: bool = False
+    last: BoundaryContext | None = None
+    bound: dict[str, str] = field(default_factory=dict)
+    executed: list[ExecutedRecord] = field(default_factory=list)
+    graph: SceneGraph = field(default_factory=lambda: SceneGraph(()))
+    final: SceneGraph | None = None
+    robot_world_m: Vec3 = (0.0, 0.0, 0.0)
+    worked_at: Vec3 | None = None
+    time_s: float = 0.0
+    seconds: dict[str, float] = field(default_factory=dict)
+    since: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the plan has no further subtask."""
+        return self.position >= len(self.plan)
+
+    def ground(self) -> Subtask:
+        """The next subtask with instance names where they are known."""
+        planned = self.plan.subtasks[self.position]
+        return ground_subtask(planned, self.graph, self.domain, self.robot_world_m, self.bound)
+
+    def command(self, subtask: Subtask, position: int) -> Subtask:
+        """What to send to the robot for a grounded subtask of the plan."""
+        return executable(subtask, self.plan.subtasks[position], self.domain)
+
+    def views(self, subtask: Subtask) -> tuple[Vec3, ...]:
+        """Where the hand let go last, and the arguments that it does not hold."""
+        points: list[Vec3] = [] if self.worked_at is None else [self.worked_at]
+        for name in subtask.args:
+            node = self.graph.get(name)
+            if node is not None and node.centroid_m is not None and node.id != self.graph.holding:
+                points.append(node.centroid_m)
+        return tuple(points)
+
+    def approach(self) -> str | None:
+        """The thing at which the next subtask is done, None where nothing is to be driven to."""
+        subtask = self.ground()
+        node = self.graph.get(subtask.args[-1])
+        if (
+            self.domain.skill(subtask.skill).drives
+            or node is None
+            or node.centroid_m is None
+            or self.domain.is_open_support(node.category)
+        ):
+            return None
+        return node.id
+
+    def move_to(self, subtask: Subtask | str | None) -> None:
+        """Make a subtask the next one; what lies between is skipped.
+
+        Raises:
+            InputError: the plan is finished, or has no such subtask from here on.
+        """
+        if self.finished:
+            raise InputError("the plan is finished: call finish()")
+        if subtask is None:
+            return
+        wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
+        for position in range(self.position, len(self.plan)):
+            if same_step(self.plan.subtasks[position], wanted):
+                if position != self.position:
+                    self.close_boundary()
+                    self.position = position
+                return
+        raise InputError(
+            f"{wanted} is not in what is left of the plan; "
+            f"next is {self.plan.subtasks[self.position]}"
+        )
+
+    def adopt(self, plan: Plan) -> None:
+        """Go on with another plan."""
+        self.plan, self.position = plan, 0
+        self.replans += 1
+
+    def close_boundary(self) -> None:
+        """The next look is the first of another boundary."""
+        self.boundary += self.looks > 0
+        self.looks = 0
+
+    def note_executed(self, outcome: SkillOutcome) -> None:
+        """The subtask that was judged is over; after a refusal no name means what it meant.
+
+        Raises:
+            InputError: none was judged.
+        """
+        if self.last is None or not self.ready:
+            raise InputError("no subtask was judged before: call before(observation) first")
+        self.close_boundary()
+        subtask = self.last.subtask
+        for name in subtask.args:
+            if is_instance(name):
+                self.bound[category_of(name)] = name
+        if outcome.status is SkillStatus.REFUSED:
+            self.bound.clear()
+        self.worked_at = outcome.hand_world_m
+        command = self.command(subtask, self.position)
+        self.executed.append(ExecutedRecord(command, outcome, self.boundary - 1))
+        self.position += 1
+        self.ready = False
+
+    def context(
+        self,
+        when: When,
+        index: int,
+        subtask: Subtask,
+        scope: Callable[[SceneGraph, Subtask], SceneGraph],
+        observation: Observation | None,
+        max_looks: int,
+    ) -> BoundaryContext:
+        """What a strategy may know now."""
+        left = len(self.plan) - index
+        look = self.looks + 1
+        return BoundaryContext(
+            task=self.task,
+            plan=self.plan,
+            index=index,
+            done=max(0, len(self.first_plan) - left),
+            subtask=subtask,
+            graph=self.graph,
+            scoped=scope(self.graph, subtask),
+            observation=observation,
+            looks=look,
+            may_look=look < max_looks,
+            replans=self.replans,
+            when=when,
+        )
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Book measured time under a name."""
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.book(name, time.perf_counter() - started)
+
+    def book(self, name: str, seconds: float) -> None:
+        """Add to the time of a phase."""
+        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
+
+    def mark(self) -> None:
+        """What is booked from here on belongs to the next boundary."""
+        self.since = dict(self.seconds)

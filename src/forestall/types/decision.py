@@ -1,0 +1,72 @@
+"""What the monitor answers: may the subtask start, and if not, what instead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from forestall.types.observation import Vec3
+from forestall.types.plan import Plan, Subtask
+from forestall.types.verdict import Diagnosis, Replan, Verdict
+
+if TYPE_CHECKING:
+    from forestall.types.episode import BoundaryRecord
+    from forestall.types.runtime import BoundaryContext
+
+
+class Outcome(Enum):
+    """What the monitor says of a moment; only what was judged is said to proceed."""
+
+    PROCEED = "proceed"
+    LOOK = "look"  # once more, at `look_at`, and ask again
+    REPLAN = "replan"  # the monitor follows a new plan from here; ask again for its first subtask
+    HOLD = "hold"  # do not go on, see `hold` and `why`
+    NOT_JUDGED = "not judged"  # nothing is known against it, and nothing for it
+
+
+class Hold(Enum):
+    """Why the robot should stay where it is."""
+
+    STOPPED = "stopped safely"  # a fact must change and no plan changes it
+    ALARM = "alarm without an answer"  # unexplained, or without a plan, or repaired too often
+    REPLAN_LIMIT = "replan limit"
+    SUBTASK_LIMIT = "subtask limit"
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorDecision:
+    """The answer at one moment of a run.
+
+    Args:
+        outcome: what to do.
+        may_start: whether the caller may go on with what comes next (before a subtask: send
+            `command`): after "proceed", and after "not judged" where the policy says so.
+        subtask: what it is about, grounded to instance names where they are known.
+        command: the subtask to send to the robot, None at the end of a plan.
+        verdict: what the detector said.
+        diagnosis: what is wrong and what must change, on an alarm.
+        replan: the attempt at a corrected plan, on an alarm.
+        plan: the new plan that is followed from here on, for "replan".
+        look_at: world points to look at, for "look"; empty: all around.
+        hold: the kind of reason, for "hold".
+        why: the reason in words.
+        seconds: compute time by phase.
+        context: what was known; None where nothing was looked at.
+        record: the record of this moment; None where nothing was looked at.
+    """
+
+    outcome: Outcome
+    may_start: bool
+    subtask: Subtask | None = None
+    command: Subtask | None = None
+    verdict: Verdict | None = None
+    diagnosis: Diagnosis | None = None
+    replan: Replan | None = None
+    plan: Plan | None = None
+    look_at: tuple[Vec3, ...] = ()
+    hold: Hold | None = None
+    why: str = ""
+    seconds: tuple[tuple[str, float], ...] = ()
+    context: BoundaryContext | None = None
+    record: BoundaryRecord | None = None
