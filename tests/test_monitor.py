@@ -25,7 +25,7 @@ from forestall.types.verdict import (
     ReplanOutcome,
     Verdict,
 )
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 PLAN = Plan.parse(["pick_up(Mug)", "put_in(Mug, Sink)"], "a mug in the sink")
 DONE = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)
@@ -88,7 +88,7 @@ class Scripted:
 
 def started(*answers: StrategyAnswer, **config: object) -> tuple[Monitor, Scripted]:
     strategy = Scripted(*answers)
-    monitor = Monitor(strategy, household(), config=MonitorConfig(**config))  # type: ignore[arg-type]
+    monitor = Monitor(strategy, shipped("household"), config=MonitorConfig(**config))  # type: ignore[arg-type]
     monitor.start(PLAN)
     return monitor, strategy
 
@@ -150,7 +150,7 @@ def test_what_was_not_judged_is_not_said_to_proceed(
 
 
 def test_holding_is_the_default_and_the_caller_may_overrule_it() -> None:
-    monitor = Monitor(NoReplanning(), household())
+    monitor = Monitor(NoReplanning(), shipped("household"))
     monitor.start(PLAN)
     decision = monitor.before(scene())
     assert (decision.outcome, decision.may_start) == (Outcome.NOT_JUDGED, False)
@@ -266,7 +266,7 @@ def test_a_refusal_unbinds_and_its_reason_is_not_told() -> None:
 
 def test_what_a_subtask_has_led_to_is_looked_at_where_the_strategy_wants_it() -> None:
     strategy = Scripted(GO, LOOK, GO, looks_after=LooksAfter.SUBTASK)
-    monitor = Monitor(strategy, household())
+    monitor = Monitor(strategy, shipped("household"))
     monitor.start(PLAN)
     monitor.before(scene())
     let_go = replace(DONE, hand_world_m=(5.0, 5.0, 1.0))
@@ -286,7 +286,7 @@ def test_what_a_subtask_has_led_to_is_looked_at_where_the_strategy_wants_it() ->
 
 def test_the_end_is_looked_at_where_the_strategy_wants_it() -> None:
     strategy = Scripted(GO, GO, REPLAN, looks_after=LooksAfter.EPISODE)
-    monitor = Monitor(strategy, household())
+    monitor = Monitor(strategy, shipped("household"))
     monitor.start(PLAN)
     for held in (None, "Mug-2"):
         monitor.before(scene(held))
@@ -298,7 +298,7 @@ def test_the_end_is_looked_at_where_the_strategy_wants_it() -> None:
 
 
 def nothing_started(monitor: Monitor) -> object:
-    return Monitor(Scripted(), household()).before(scene())
+    return Monitor(Scripted(), shipped("household")).before(scene())
 
 
 @pytest.mark.parametrize(
@@ -333,7 +333,7 @@ def test_an_error_in_a_part_comes_out_as_it_is() -> None:
         def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
             raise PerceptionError("the camera is gone")
 
-    monitor = Monitor(Broken(), household(), config=MonitorConfig(on_not_judged="proceed"))
+    monitor = Monitor(Broken(), shipped("household"), config=MonitorConfig(on_not_judged="proceed"))
     monitor.start(PLAN)
     with pytest.raises(PerceptionError, match="camera"):
         monitor.before(scene())

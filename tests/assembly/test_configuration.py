@@ -15,7 +15,7 @@ from forestall.assembly.parts import Assembly
 from forestall.cli.flags import RunFlags, spelt
 from forestall.errors import FileFormatError, InputError
 from forestall.kinds import DETECTOR, PERCEIVER, REASONER, REPLANNER, STORE, TEXT_ENCODER, WORLD
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 FILE = """
 seed = 7
@@ -124,7 +124,7 @@ def test_ablations_are_choices_of_parts() -> None:
     reasoning = run_config("heat-potato", without="reasoning")
     assert reasoning.choice(REASONER).name == "none"
     assert reasoning.choice(REPLANNER).name == "anew"
-    parts = Assembly(run_config("heat-potato", without="structure").choices, household())
+    parts = Assembly(run_config("heat-potato", without="structure").choices, shipped("household"))
     assert parts.part(DETECTOR).name == "scene-graph without structure"
     unchecked = run_config("heat-potato", without="validation").choice(REPLANNER)
     assert dict(unchecked.given) == {"validator": "accept-all"}
@@ -132,8 +132,8 @@ def test_ablations_are_choices_of_parts() -> None:
 
 def test_a_strategy_that_compares_wants_a_memory() -> None:
     with pytest.raises(InputError, match="'proactive' compares with demonstrations"):
-        make_strategy(run_config("heat-potato"), household(), [])
-    assert make_strategy(run_config("heat-potato", strategy="none"), household(), None)
+        make_strategy(run_config("heat-potato"), shipped("household"), [])
+    assert make_strategy(run_config("heat-potato", strategy="none"), shipped("household"), None)
 
 
 def test_what_was_said_of_one_part_is_said_once() -> None:

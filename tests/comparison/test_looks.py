@@ -39,11 +39,11 @@ def score(
     observed: SceneGraph, expected: SceneGraph, config: ScoreConfig = IMAGE
 ) -> tuple[ScoreParts, tuple[tuple[str, str], ...]]:
     """Parts and matches, the parts the same in a batch and the other way round."""
-    plain = compare(observed, expected, config, ENCODER)
-    batch = BatchScorer(config, ENCODER)
+    plain = compare(observed, expected, config, ENCODER, DOMAIN)
+    batch = BatchScorer(config, ENCODER, DOMAIN)
     assert batch.scores(observed, [expected, observed, expected]) == [
         plain.parts,
-        compare(observed, observed, config, ENCODER).parts,
+        compare(observed, observed, config, ENCODER, DOMAIN).parts,
         plain.parts,
     ]
     assert batch.scores(expected, [observed]) == [plain.parts]
@@ -150,10 +150,10 @@ def test_other_features_do_not_look(feature: Feature) -> None:
 def test_features_of_two_encoders_do_not_compare() -> None:
     other = looking(scene("Mug-1"), Mug_1=quantised([1.0, 2.0, 3.0]))
     with pytest.raises(InputError, match="of 2 and 3 numbers do not compare"):
-        compare(other, MUG, IMAGE, ENCODER)
+        compare(other, MUG, IMAGE, ENCODER, DOMAIN)
     with pytest.raises(InputError, match="record the demonstrations with"):
-        BatchScorer(IMAGE, ENCODER).scores(scene("Mug-1"), [other, MUG])
-    assert compare(other, MUG, ScoreConfig(), ENCODER).parts.score == 1.0
+        BatchScorer(IMAGE, ENCODER, DOMAIN).scores(scene("Mug-1"), [other, MUG])
+    assert compare(other, MUG, ScoreConfig(), ENCODER, DOMAIN).parts.score == 1.0
 
 
 def test_a_floor_out_of_range() -> None:

@@ -12,9 +12,9 @@ from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Reference
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
-VOCABULARY = household()
+VOCABULARY = shipped("household")
 
 
 def references(task: str, index: int, *graphs: SceneGraph) -> list[Reference]:

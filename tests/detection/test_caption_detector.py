@@ -15,7 +15,7 @@ from forestall.seams import Detector
 from forestall.types.demonstration import View
 from forestall.types.graph import Relation
 from forestall.types.verdict import Decision
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 TEXTS = HashedTextEncoder()
 
@@ -47,7 +47,7 @@ def test_another_caption_is_flagged_below_the_threshold() -> None:
 
 
 def test_relations_do_not_show_in_a_listing() -> None:
-    captioner = ListingCaptioner(household())
+    captioner = ListingCaptioner(shipped("household"))
     apart = graph(node("Mug-1", filled="empty"), "Pot-1")
     links = (Relation("Pot-1", "blocking", "Mug-1"),)
     blocked = graph(node("Mug-1", filled="empty"), "Pot-1", links=links)

@@ -9,7 +9,7 @@ import pytest
 
 from forestall.embeddings.twotower import DESCRIPTION_NAME, TwoTowerEncoder, shipped
 from forestall.errors import InputError, ModelFileError
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_texts_that_say_the_same_are_near(encoder: TwoTowerEncoder) -> None:
 
 
 def test_values_of_an_attribute_are_told_apart(encoder: TwoTowerEncoder) -> None:
-    vocabulary = household()
+    vocabulary = shipped("household")
     for category, attribute in (("Microwave", "open"), ("Mug", "filled"), ("Plate", "dirty")):
         texts = [
             vocabulary.phrases(category, attribute, v)[0] for v in vocabulary.values(attribute)

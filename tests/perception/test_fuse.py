@@ -11,7 +11,7 @@ from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph, Seen
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 from .synthetic import Solid, at, hollow, looking, observed
 
@@ -27,7 +27,7 @@ class Robot:
 
     def __init__(self) -> None:
         self.states: dict[str, dict[str, str]] = {}
-        self._perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), household())
+        self._perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), shipped("household"))
         self._time_s = 0.0
 
     def sees(

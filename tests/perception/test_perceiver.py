@@ -23,7 +23,7 @@ from forestall.seams import Perceiver, Segmenter, StateEstimator
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 from .synthetic import Solid, at, looking, observed
 
@@ -55,7 +55,7 @@ def test_the_parts_fulfil_their_protocols() -> None:
     segmenter: Segmenter = InstanceSegmenter()
     other: Segmenter = GivenMasks()
     oracle: StateEstimator = OracleStateEstimator(lambda name: {})
-    perceiver: Perceiver = GraphPerceiver(segmenter, oracle, household())
+    perceiver: Perceiver = GraphPerceiver(segmenter, oracle, shipped("household"))
     assert perceiver.describe() == {
         "segmenter": "simulator instance ids",
         "state_estimator": "oracle states",
@@ -69,13 +69,13 @@ def test_the_order_of_detections_does_not_matter(order: list[int]) -> None:
     observation = observed(SCENE, EYE)
     graphs = []
     for chosen in (list(range(len(SCENE))), order):
-        perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), household())
+        perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), shipped("household"))
         graphs.append(perceiver.perceive(as_detections(observation, named=True, order=chosen)))
     assert graphs[0] == graphs[1]
 
 
 def test_untracked_detections_keep_their_names_over_time() -> None:
-    perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), household())
+    perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), shipped("household"))
     first = perceiver.perceive(as_detections(observed(SCENE, EYE), named=False))
     assert {n.id for n in first.of_category("Mug")} == {"Mug-1", "Mug-2"}
     other = looking((0.3, -0.7, 1.65), (0.0, 0.3, 0.9))
@@ -176,7 +176,7 @@ def test_moving_the_world_moves_the_graph() -> None:
     pose[:3, 3] += shift
     graphs = []
     for solids, camera in ((SCENE, EYE), ([s.moved(shift) for s in SCENE], pose)):
-        perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), household())
+        perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), shipped("household"))
         graphs.append(perceiver.perceive(observed(solids, camera)))
     assert graphs[0].relations == graphs[1].relations
 
@@ -187,7 +187,7 @@ def test_nothing_has_two_parents_or_is_its_own(
     data: list[tuple[float, float, float, float]],
 ) -> None:
     stack = things(data, np.zeros(3))
-    found = parents(stack, {t.id for t in stack.things}, household(), PerceptionConfig())
+    found = parents(stack, {t.id for t in stack.things}, shipped("household"), PerceptionConfig())
     for name in found:
         passed = [name]
         while passed[-1] in found:
@@ -223,13 +223,13 @@ def test_an_estimator_that_answers_for_too_few_is_refused() -> None:
         def estimate(self, frame: Frame, detections: Sequence[Detection]) -> list[dict[str, str]]:
             return []
 
-    perceiver = GraphPerceiver(InstanceSegmenter(), Silent(), household())
+    perceiver = GraphPerceiver(InstanceSegmenter(), Silent(), shipped("household"))
     with pytest.raises(PerceptionError, match="silent"):
         perceiver.perceive(observed(SCENE, EYE))
 
 
 def test_times_are_measured_one_by_one() -> None:
-    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), household())
+    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), shipped("household"))
     times = perception_times(perceiver, observed(SCENE, EYE), 3)
     assert len(times) == 3
     assert min(times) > 0
@@ -258,7 +258,7 @@ def whole_graph() -> SceneGraph:
 
 def scoped(text: str, config: ScopeConfig | None = None) -> SceneGraph:
     perceiver = GraphPerceiver(
-        InstanceSegmenter(), GivenStateEstimator({}), household(), scope_config=config
+        InstanceSegmenter(), GivenStateEstimator({}), shipped("household"), scope_config=config
     )
     return perceiver.scope(whole_graph(), Subtask.parse(text))
 

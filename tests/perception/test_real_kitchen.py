@@ -13,7 +13,7 @@ from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Intrinsics, Observation
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 NEEDS = SceneNeeds(
@@ -62,7 +62,7 @@ def blocked(graph: SceneGraph) -> set[str]:
 @pytest.fixture(scope="module", params=[301, 302])
 def run(request: pytest.FixtureRequest) -> Iterator[tuple[SceneGraph, SceneGraph, int, int]]:
     """Graph and truth after the last look, and how many visible facts were right and wrong."""
-    vocabulary = household()
+    vocabulary = shipped("household")
     kitchen = KitchenEnvironment(
         NEEDS, vocabulary, intrinsics=Intrinsics.from_vertical_fov(480, 360, 60.0)
     )
@@ -102,7 +102,7 @@ def test_what_stands_in_front_blocks(run: Run) -> None:
 
 def test_only_what_is_closed_is_hidden(run: Run) -> None:
     graph, truth, _, _ = run
-    vocabulary = household()
+    vocabulary = shipped("household")
     shut = [
         n.id
         for n in truth.nodes

@@ -11,9 +11,9 @@ from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
-from forestall.vocabulary import ATTRIBUTES, household
+from forestall.domain.load import shipped
 
-VOCABULARY = household()
+VOCABULARY = shipped("household")
 _PREDICATES = {"on": "on_top_of", "in": "inside", "blocks": "blocking"}
 _BOX = Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 

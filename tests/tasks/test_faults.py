@@ -6,10 +6,10 @@ from forestall.tasks import faults as f
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.flat_world import flat_environment
 
-VOCABULARY = household()
+VOCABULARY = shipped("household")
 NEEDS = SceneNeeds(
     objects=(ObjectNeed("Mug-1", "Mug", ("CounterTop-1",)), ObjectNeed("Pot-1", "Pot")),
     fixtures=(("Microwave-1", "open", "closed"),),

@@ -60,18 +60,18 @@ class Run:
         return TruthGoalChecker().check(self.loaded.task.goal, self.kitchen.oracle)
 
     def planned(self) -> Planned:
-        truth = observed(self.kitchen.oracle.truth(), self.loaded.vocabulary)
+        truth = observed(self.kitchen.oracle.truth(), self.loaded.domain)
         return plan_goal(truth, self.loaded.task.goal, QUICK)
 
 
 def started(name: str, seed: int) -> Run:
     scenario = load_scenario(name)
     loaded = load_task(scenario.task)
-    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.vocabulary)
+    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.domain)
     plan = apply_plan_faults(loaded.task.plan, scenario.faults)
-    check_steps(plan, scenario.faults, loaded.vocabulary)
-    kitchen = flat_environment(needs, loaded.vocabulary)
-    faulty = wrap(kitchen, scenario.faults, kitchen, loaded.vocabulary)
+    check_steps(plan, scenario.faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    faulty = wrap(kitchen, scenario.faults, kitchen, loaded.domain)
     faulty.reset(seed)
     return Run(scenario, loaded, plan, kitchen, faulty)
 
@@ -90,7 +90,7 @@ def wash_up(run: Run) -> None:
     run.execute("toggle_off(Microwave)", "open_obj(Microwave)", "open_obj(Fridge)")
     for node in home.nodes:
         used = node.state("dirty") == "dirty" or node.state("filled") not in (None, "empty")
-        if used and run.loaded.vocabulary[node.id].pickupable:
+        if used and run.loaded.domain[node.id].pickupable:
             held = run.kitchen.oracle.truth().holding
             if held is not None:
                 run.execute(f"put_on({held}, CounterTop)")

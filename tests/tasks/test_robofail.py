@@ -16,7 +16,7 @@ from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
@@ -63,9 +63,9 @@ def _plan(scenario: Scenario) -> Plan:
 def _play(scenario: Scenario, seed: int) -> tuple[KitchenEnvironment, list[tuple[int, str]]]:
     """Run the starting plan unwatched; the world and every (position, reason) of a refusal."""
     loaded = load_task(scenario.task)
-    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.vocabulary)
-    kitchen = flat_environment(needs, loaded.vocabulary)
-    env = wrap(kitchen, scenario.faults, kitchen, loaded.vocabulary)
+    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    env = wrap(kitchen, scenario.faults, kitchen, loaded.domain)
     env.reset(seed)
     refused = []
     for at, subtask in enumerate(_plan(scenario)):
@@ -95,7 +95,7 @@ def test_a_scenario_fits_its_task_and_says_when_it_can_be_known(name: str) -> No
     scenario = load_scenario(name)
     loaded = load_task(scenario.task)
     plan = _plan(scenario)
-    check_steps(plan, scenario.faults, loaded.vocabulary)
+    check_steps(plan, scenario.faults, loaded.domain)
     known, effect = scenario.moments(plan)
     assert known is not None and effect is not None
     broken = name in BROKEN_BY_FALLING
@@ -180,7 +180,7 @@ MIXED_UP = parse_fault(
 def _mixed_up(*steps: str) -> KitchenEnvironment:
     """A kitchen in which a bowl is taken for the mug, after some steps that must all work."""
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"), ObjectNeed("Bowl-1", "Bowl")))
-    kitchen = flat_environment(needs, household())
+    kitchen = flat_environment(needs, shipped("household"))
     env = wrap(kitchen, [MIXED_UP], kitchen)
     env.reset(0)
     for step in steps:
@@ -209,7 +209,7 @@ def test_the_mistake_ends_when_it_has_happened_often_enough() -> None:
 
 def test_a_reset_ends_the_mistake() -> None:
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"), ObjectNeed("Bowl-1", "Bowl")))
-    kitchen = flat_environment(needs, household())
+    kitchen = flat_environment(needs, shipped("household"))
     env = wrap(kitchen, [MIXED_UP], kitchen)
     env.reset(0)
     env.execute(Subtask.parse("pick_up(Mug)"))

@@ -7,7 +7,7 @@ from forestall.types.facts import category_of
 from forestall.types.observation import Intrinsics
 from forestall.types.plan import Subtask
 from forestall.types.scene import SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.effects import EffectConfig
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatRenderer, FlatScene, FlatWorld
@@ -54,7 +54,7 @@ class SmallKitchen:
         self.world = FlatWorld(scene)
         self.env = KitchenEnvironment(
             SceneNeeds(),
-            household(),
+            shipped("household"),
             intrinsics=Intrinsics.from_vertical_fov(64, 48, 60.0),
             effect_config=EffectConfig(cool_down_s=cool_down_s),
             build=lambda needs, seed, vocabulary: self.world,

@@ -7,7 +7,7 @@ from forestall.tasks.files import load_scenario, load_task, scenario_names
 from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
@@ -96,7 +96,7 @@ def _run(env, plan, seed):
 @pytest.mark.parametrize("task", sorted(PLANS))
 def test_a_nominal_plan_runs_and_reaches_its_goal(task):
     loaded = load_task(task).task
-    env = flat_environment(loaded.scene, household())
+    env = flat_environment(loaded.scene, shipped("household"))
     for seed in range(8):
         assert _run(env, _plan(task), seed) == []
         assert TruthGoalChecker().check(loaded.goal, env.oracle) == (True, True, ())
@@ -133,8 +133,8 @@ EXPECTED = {
 def test_a_scenario_makes_its_task_fail_at_the_step_concerned(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    needs = apply_scene_faults(task.scene, scenario.faults, household())
-    inner = flat_environment(needs, household())
+    needs = apply_scene_faults(task.scene, scenario.faults, shipped("household"))
+    inner = flat_environment(needs, shipped("household"))
     env = wrap(inner, scenario.faults, inner)
     plan = apply_plan_faults(_plan(task.name), scenario.faults)
     assert _run(env, plan, 2) == EXPECTED[name]
@@ -177,7 +177,7 @@ def test_a_scenario_can_be_overcome(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
     env = flat_environment(
-        apply_scene_faults(task.scene, scenario.faults, household()), household()
+        apply_scene_faults(task.scene, scenario.faults, shipped("household")), shipped("household")
     )
     assert _run(env, Plan.parse(CORRECTED[name].split()), 2) == []
     assert TruthGoalChecker().check(task.goal, env.oracle)[0]
@@ -186,7 +186,7 @@ def test_a_scenario_can_be_overcome(name):
 def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
     scenario = load_scenario("mug-dropped")
     task = load_task(scenario.task).task
-    inner = flat_environment(task.scene, household())
+    inner = flat_environment(task.scene, shipped("household"))
     env = wrap(inner, scenario.faults, inner)
     plan = _plan(task.name)
     env.reset(1)
@@ -202,7 +202,7 @@ def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
 @pytest.mark.parametrize("task", sorted(PLANS))
 def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task):
     loaded = load_task(task).task
-    env = KitchenEnvironment(loaded.scene, household())
+    env = KitchenEnvironment(loaded.scene, shipped("household"))
     for seed in (101, 102):
         assert _run(env, _plan(task), seed) == []
         assert TruthGoalChecker().check(loaded.goal, env.oracle) == (True, True, ())
@@ -212,8 +212,8 @@ def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task):
 def test_a_scenario_makes_its_task_fail_in_the_real_kitchen(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    needs = apply_scene_faults(task.scene, scenario.faults, household())
-    inner = KitchenEnvironment(needs, household())
+    needs = apply_scene_faults(task.scene, scenario.faults, shipped("household"))
+    inner = KitchenEnvironment(needs, shipped("household"))
     env = wrap(inner, scenario.faults, inner)
     plan = apply_plan_faults(_plan(task.name), scenario.faults)
     assert _run(env, plan, 103)[:1] == EXPECTED[name][:1]

@@ -9,7 +9,7 @@ from forestall.types.episode import SkillStatus
 from forestall.types.observation import Intrinsics
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import SCAN_FRAMES, KitchenEnvironment
 
 SMALL = Intrinsics.from_vertical_fov(96, 72, 60.0)
@@ -23,7 +23,7 @@ NEEDS = SceneNeeds(
 
 
 def _make():
-    return KitchenEnvironment(NEEDS, household(), intrinsics=SMALL)
+    return KitchenEnvironment(NEEDS, shipped("household"), intrinsics=SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -97,4 +97,4 @@ def test_a_dropped_mug_lies_on_the_floor_and_can_be_picked_up(env):
 def test_what_is_named_wrongly_at_building_is_a_clear_error():
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug", ("Toaster",)),))
     with pytest.raises(SceneError, match="Toaster does not take a Mug"):
-        KitchenEnvironment(needs, household()).reset(0)
+        KitchenEnvironment(needs, shipped("household")).reset(0)

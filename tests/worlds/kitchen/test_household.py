@@ -7,13 +7,13 @@ from small_kitchen import SmallKitchen
 from forestall.errors import UnknownNameError
 from forestall.types.facts import Literal, Truth
 from forestall.types.plan import SKILLS, Subtask
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatScene, FlatWorld
 from forestall.worlds.kitchen.household import Household, natural_key
 
 
 def _home(*instances: FlatInstance) -> Household:
-    return Household(household(), FlatWorld(FlatScene(instances)), instances)
+    return Household(shipped("household"), FlatWorld(FlatScene(instances)), instances)
 
 
 def test_truth_has_everything_with_all_states_and_no_prepared_things():
@@ -112,7 +112,7 @@ def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed):
         "Egg-1@Fridge-1", "Bowl-1@CounterTop-1 filled=wine", "Knife-1@CounterTop-2",
         "Pan-1@StoveBurner-1", "StoveBurner-1 toggled=on",
     )  # fmt: skip
-    vocabulary = household()
+    vocabulary = shipped("household")
     verbs = sorted(SKILLS)
     clock = 0.0
     for _ in range(40):

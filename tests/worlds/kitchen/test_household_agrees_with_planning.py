@@ -8,7 +8,7 @@ from forestall.planning.domain import Refusal, State, apply
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER
 from forestall.types.plan import SKILLS, Subtask
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 CHOICES = [
     ["Mug-1@CounterTop-1", "Mug-1@CoffeeMachine-1 dirty=dirty", "Mug-1@Sink-1 filled=coffee"],
@@ -56,7 +56,7 @@ def test_planning_predicts_what_the_household_does(seed):
     rng = np.random.default_rng(seed)
     chosen = [str(options[int(rng.integers(len(options)))]) for options in CHOICES]
     kitchen = SmallKitchen(*chosen, cool_down_s=1e9)
-    state = State.from_graph(kitchen.env.oracle.truth(), household())
+    state = State.from_graph(kitchen.env.oracle.truth(), shipped("household"))
     state.spoiled = frozenset(kitchen.spoiled)
     for _ in range(40):
         subtask = _random_subtask(rng, sorted(state.kinds), state.held)

@@ -12,12 +12,12 @@ from forestall.errors import InputError, SceneError
 from forestall.tasks.faults import apply_scene_faults, parse_fault
 from forestall.tasks.files import load_task
 from forestall.types.scene import AXES, SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.settled import check_settled
 from forestall.worlds.kitchen.world import KitchenWorld
 
-VOCABULARY = household()
+VOCABULARY = shipped("household")
 SEEDS = (40, 41, 42)
 
 

@@ -11,13 +11,13 @@ import pytest
 from forestall.errors import ForestallError, SceneError, UnknownNameError
 from forestall.types.facts import category_of
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household, parse_category
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.placement import footprint_at
 from forestall.worlds.kitchen.settled import check_settled
 from forestall.worlds.kitchen.world import KitchenWorld
 
-VOCABULARY = household()
+VOCABULARY = shipped("household")
 SALAD = SceneNeeds(
     objects=(
         ObjectNeed("Lettuce-1", "Lettuce"),

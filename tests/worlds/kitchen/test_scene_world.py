@@ -8,14 +8,14 @@ import pytest
 
 from forestall.errors import SceneError
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen.forms import FLOOR
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.navigation import EYE_HEIGHT_M
 from forestall.worlds.kitchen.settled import check_settled
 from forestall.worlds.kitchen.world import KitchenWorld
 
-VOCABULARY = household()
+VOCABULARY = shipped("household")
 NEEDS = SceneNeeds(
     objects=(
         ObjectNeed("Bowl-1", "Bowl", places=("Microwave",)),
