@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from forestall.conclusion import MonitorConfig
+from forestall.domain.load import shipped
 from forestall.errors import InputError, PerceptionError
 from forestall.monitor import Monitor
 from forestall.strategies.none import NoReplanning
@@ -25,7 +26,6 @@ from forestall.types.verdict import (
     ReplanOutcome,
     Verdict,
 )
-from forestall.domain.load import shipped
 
 PLAN = Plan.parse(["pick_up(Mug)", "put_in(Mug, Sink)"], "a mug in the sink")
 DONE = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)

@@ -7,7 +7,6 @@ from forestall.vocabulary import (
     ATTRIBUTES,
     Attribute,
     Category,
-    household,
     parse_attribute,
     parse_category,
 )

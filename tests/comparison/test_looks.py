@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from forestall.comparison.looks import NEVER, NOTHING, QUANTUM, joined, looks_of, seen
 from forestall.comparison.score import BatchScorer, Feature, ScoreConfig, compare
 from forestall.comparison.timing import random_graph, score_times
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError
 from forestall.types.feature import quantised
@@ -21,6 +22,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.verdict import ScoreParts
 
 ENCODER = HashedTextEncoder()
+DOMAIN = shipped("household")
 IMAGE = ScoreConfig(feature=Feature.IMAGE)
 EAST, NORTH, BETWEEN, NEARLY = (
     quantised(v) for v in ([1.0, 0.0], [0.0, 1.0], [127 * 0.5, 110.0], [4.0, 3.0])
@@ -140,7 +142,7 @@ def test_supports_are_one_node_whatever_they_look_like() -> None:
 def test_other_features_do_not_look(feature: Feature) -> None:
     config = ScoreConfig(feature=feature)
     rng = np.random.default_rng(2)
-    one, other = (random_graph(12, rng, feature_size=8) for _ in range(2))
+    one, other = (random_graph(12, rng, DOMAIN, feature_size=8) for _ in range(2))
     bare = [
         replace(g, nodes=tuple(replace(n, feature=None) for n in g.nodes)) for g in (one, other)
     ]
@@ -192,8 +194,9 @@ def test_where_one_has_no_picture_or_may_not_match() -> None:
 
 
 def test_timing_with_images() -> None:
-    assert len(score_times(3, 8, seed=1, repeat=2, feature=Feature.IMAGE, feature_size=16)) == 2
-    plain = random_graph(20, np.random.default_rng(5))
+    times = score_times(3, 8, 1, DOMAIN, repeat=2, feature=Feature.IMAGE, feature_size=16)
+    assert len(times) == 2
+    plain = random_graph(20, np.random.default_rng(5), DOMAIN)
     assert all(n.feature is None for n in plain.nodes)
-    pictured = random_graph(20, np.random.default_rng(5), feature_size=16)
+    pictured = random_graph(20, np.random.default_rng(5), DOMAIN, feature_size=16)
     assert {len(n.feature) for n in pictured.nodes if n.feature is not None} == {16}

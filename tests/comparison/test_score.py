@@ -16,12 +16,14 @@ from forestall.comparison.score import (
     compare,
 )
 from forestall.comparison.timing import DirectionEncoder, random_graph, score_times
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Reference
 
 ENCODER = HashedTextEncoder()
+DOMAIN = shipped("household")
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=lambda p: p.name)
@@ -42,12 +44,18 @@ def test_worked_pairs(pair: Pair) -> None:
 def test_worked_pairs_in_a_batch(pair: Pair) -> None:
     scorer = BatchScorer(pair.config, ENCODER, DOMAIN)
     both = scorer.scores(pair.observed, [pair.expected, pair.observed, pair.expected])
-    assert both[0] == both[2] == compare(pair.observed, pair.expected, pair.config, ENCODER, DOMAIN).parts
+    assert (
+        both[0]
+        == both[2]
+        == compare(pair.observed, pair.expected, pair.config, ENCODER, DOMAIN).parts
+    )
 
 
 def graphs(largest: int = 14) -> st.SearchStrategy[SceneGraph]:
     return st.builds(
-        lambda n, seed, size: random_graph(n, np.random.default_rng(seed), feature_size=size),
+        lambda n, seed, size: random_graph(
+            n, np.random.default_rng(seed), DOMAIN, feature_size=size
+        ),
         st.integers(2, largest),
         st.integers(0, 2**20),
         st.sampled_from((0, 6, 6)),
@@ -127,7 +135,9 @@ def test_structure_of_the_paper_is_not_monotone() -> None:
     assert compare(two, expected, ScoreConfig(), ENCODER, DOMAIN).parts.structure == 0.5
     assert compare(one, expected, ScoreConfig(), ENCODER, DOMAIN).parts.structure == 1.0
     union = ScoreConfig(structure_count=StructureCount.UNION)
-    parts = [compare(g, expected, union, ENCODER, DOMAIN).parts.structure for g in (expected, two, one)]
+    parts = [
+        compare(g, expected, union, ENCODER, DOMAIN).parts.structure for g in (expected, two, one)
+    ]
     assert parts == pytest.approx([1, 1 / 3, 1 / 3])
 
 
@@ -155,7 +165,9 @@ def test_matches_name_the_members_of_merged_supports() -> None:
 def test_other_skills_are_other_subtask_nodes() -> None:
     a, b = scene("Mug-1", "", "pick_up(Mug-1)"), scene("Mug-1", "", "open_obj(Fridge-1)")
     assert compare(a, b, ScoreConfig(), ENCODER, DOMAIN).parts.node == pytest.approx(1 / 3)
-    assert compare(a, scene("Mug-1"), ScoreConfig(), ENCODER, DOMAIN).parts.node == pytest.approx(1 / 2)
+    assert compare(a, scene("Mug-1"), ScoreConfig(), ENCODER, DOMAIN).parts.node == pytest.approx(
+        1 / 2
+    )
 
 
 def test_best_takes_the_first_of_equal_references() -> None:
@@ -177,7 +189,7 @@ def test_best_takes_the_first_of_equal_references() -> None:
 
 def test_a_small_cache_changes_nothing() -> None:
     rng = np.random.default_rng(4)
-    many = [random_graph(8, rng) for _ in range(40)]
+    many = [random_graph(8, rng, DOMAIN) for _ in range(40)]
     small, large = (
         BatchScorer(ScoreConfig(), ENCODER, DOMAIN, cache_size=3),
         BatchScorer(ScoreConfig(), ENCODER, DOMAIN),
@@ -202,17 +214,19 @@ def test_bad_options(bad: dict[str, float]) -> None:
 
 def test_unknown_predicate() -> None:
     with pytest.raises(UnknownNameError, match="inside"):
-        ScoreConfig(predicates=("insid",))
+        ScoreConfig(predicates=("insid",)).of(DOMAIN)
+    with pytest.raises(UnknownNameError, match="inside"):
+        BatchScorer(ScoreConfig(predicates=("insid",)), ENCODER, DOMAIN)
 
 
 def test_timing_helper() -> None:
-    assert len(score_times(3, 8, seed=1, repeat=4)) == 4
-    assert len(score_times(1, 4, 1, 1, DirectionEncoder())) == 1
+    assert len(score_times(3, 8, 1, DOMAIN, repeat=4)) == 4
+    assert len(score_times(1, 4, 1, DOMAIN, 1, DirectionEncoder())) == 1
     with pytest.raises(InputError):
-        score_times(0, 8, 1)
+        score_times(0, 8, 1, DOMAIN)
 
 
 def test_random_graphs_come_from_their_seed() -> None:
-    one, two = (random_graph(30, np.random.default_rng(7)) for _ in range(2))
+    one, two = (random_graph(30, np.random.default_rng(7), DOMAIN) for _ in range(2))
     assert one == two
     assert len(one.nodes) == 30

@@ -6,6 +6,7 @@ from baseline_samples import Said, graph, node, observation, reference
 
 from forestall.detection.caption import CaptionDetector
 from forestall.detection.scene_graph import DetectorConfig
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.embeddings.captions import ListingCaptioner
 from forestall.embeddings.twotower import TwoTowerEncoder
@@ -15,7 +16,6 @@ from forestall.seams import Detector
 from forestall.types.demonstration import View
 from forestall.types.graph import Relation
 from forestall.types.verdict import Decision
-from forestall.domain.load import shipped
 
 TEXTS = HashedTextEncoder()
 

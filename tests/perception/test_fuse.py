@@ -12,6 +12,7 @@ from forestall.perception.segmenters import InstanceSegmenter
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph, Seen
 from forestall.domain.load import shipped
+from forestall.domain.truth import truth as truth_of
 
 from .synthetic import Solid, at, hollow, looking, observed
 
@@ -45,7 +46,7 @@ class Robot:
 
 
 def truth(graph: SceneGraph, text: str) -> Truth:
-    return graph.truth(Literal.parse(text))
+    return truth_of(graph, Literal.parse(text), shipped("household"))
 
 
 def seen(graph: SceneGraph, name: str) -> Seen:

@@ -24,6 +24,7 @@ from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
 from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 
 from .synthetic import Solid, at, looking, observed
 
@@ -54,7 +55,7 @@ def as_detections(observation: Observation, named: bool, order: Sequence[int] = 
 def test_the_parts_fulfil_their_protocols() -> None:
     segmenter: Segmenter = InstanceSegmenter()
     other: Segmenter = GivenMasks()
-    oracle: StateEstimator = OracleStateEstimator(lambda name: {})
+    oracle: StateEstimator = OracleStateEstimator(lambda name: {}, shipped("household"))
     perceiver: Perceiver = GraphPerceiver(segmenter, oracle, shipped("household"))
     assert perceiver.describe() == {
         "segmenter": "simulator instance ids",
@@ -205,15 +206,15 @@ def test_the_oracle_tells_only_what_a_camera_could() -> None:
 
     frame = observed([COUNTER, at("Mug-1", 0.0, 0.3, 0.9, MUG, True)], EYE).frames[0]
     found = InstanceSegmenter().segment(frame)
-    near = OracleStateEstimator(states).estimate(frame, found)
+    near = OracleStateEstimator(states, shipped("household")).estimate(frame, found)
     by_name = dict(zip([d.instance for d in found], near, strict=True))
     assert by_name["Mug-1"] == {"filled": "coffee", "dirty": "dirty"}
     assert set(asked) == {"CounterTop-1", "Mug-1"}
-    far = OracleStateEstimator(states, fine_pixels=10**6).estimate(frame, found)
+    far = OracleStateEstimator(states, shipped("household"), fine_pixels=10**6).estimate(frame, found)
     by_name = dict(zip([d.instance for d in found], far, strict=True))
     assert by_name["Mug-1"] == {"filled": None, "dirty": None}
     unnamed = [Detection("Mug", found[0].mask)]
-    assert OracleStateEstimator(states).estimate(frame, unnamed) == [{}]
+    assert OracleStateEstimator(states, shipped("household")).estimate(frame, unnamed) == [{}]
 
 
 def test_an_estimator_that_answers_for_too_few_is_refused() -> None:
@@ -256,9 +257,11 @@ def whole_graph() -> SceneGraph:
     return SceneGraph(tuple(nodes), tuple(Relation(*f) for f in facts), hidden=hidden)
 
 
-def scoped(text: str, config: ScopeConfig | None = None) -> SceneGraph:
+def scoped(
+    text: str, config: ScopeConfig | None = None, domain: Domain = shipped("household")
+) -> SceneGraph:
     perceiver = GraphPerceiver(
-        InstanceSegmenter(), GivenStateEstimator({}), shipped("household"), scope_config=config
+        InstanceSegmenter(), GivenStateEstimator({}), domain, scope_config=config
     )
     return perceiver.scope(whole_graph(), Subtask.parse(text))
 
@@ -303,6 +306,8 @@ def test_the_whole_graph_can_be_asked_for() -> None:
     assert str(graph.subtask) == "pick_up(Knife-1)"
 
 
-def test_chosen_predicates_are_kept() -> None:
-    graph = scoped("pick_up(Knife-1)", ScopeConfig(predicates=("near",)))
+def test_the_relations_that_the_domain_scores_are_kept() -> None:
+    usual = shipped("household")
+    predicates = {n: replace(p, scored=n == "near") for n, p in usual.predicates.items()}
+    graph = scoped("pick_up(Knife-1)", domain=replace(usual, predicates=predicates))
     assert {str(r) for r in graph.relations} == {"Pot-1 near Knife-1"}

@@ -62,20 +62,20 @@ def blocked(graph: SceneGraph) -> set[str]:
 @pytest.fixture(scope="module", params=[301, 302])
 def run(request: pytest.FixtureRequest) -> Iterator[tuple[SceneGraph, SceneGraph, int, int]]:
     """Graph and truth after the last look, and how many visible facts were right and wrong."""
-    vocabulary = shipped("household")
+    domain = shipped("household")
     kitchen = KitchenEnvironment(
-        NEEDS, vocabulary, intrinsics=Intrinsics.from_vertical_fov(480, 360, 60.0)
+        NEEDS, domain, intrinsics=Intrinsics.from_vertical_fov(480, 360, 60.0)
     )
     kitchen.reset(request.param)
     perceiver = GraphPerceiver(
-        InstanceSegmenter(), OracleStateEstimator(kitchen.oracle.states), vocabulary
+        InstanceSegmenter(), OracleStateEstimator(kitchen.oracle.states, domain), domain
     )
     right = wrong = 0
     for observation in looks(kitchen):
         graph, truth = perceiver.perceive(observation), kitchen.oracle.truth()
         for node in graph.nodes:
-            category = vocabulary.find(node.category)
-            if category is None or category.fixture or node.seen is not Seen.VISIBLE:
+            category = domain.find(node.category)
+            if category is None or "fixture" in category.tags or node.seen is not Seen.VISIBLE:
                 continue
             stated, true = facts(graph, SUPPORT, node.id), facts(truth, SUPPORT, node.id)
             right += len(stated & true)
@@ -102,12 +102,12 @@ def test_what_stands_in_front_blocks(run: Run) -> None:
 
 def test_only_what_is_closed_is_hidden(run: Run) -> None:
     graph, truth, _, _ = run
-    vocabulary = shipped("household")
+    domain = shipped("household")
     shut = [
         n.id
         for n in truth.nodes
-        if n.category in vocabulary.categories
-        and vocabulary.encloses(n.category)
+        if n.category in domain.categories
+        and domain.encloses(n.category)
         and n.state("open") == "closed"
         and graph.get(n.id) is not None
     ]

@@ -43,6 +43,8 @@ class Predicate:
         camera: whether a picture can show it.
         contains: whether it says where a thing is: the first argument in, on or at the second.
         group: relations of one group exclude each other for one first argument.
+        symmetric: whether a relation holds from both ends.
+        mirrors: the relation that says the same from the other end, which is said instead.
         scored: whether the comparison counts it, and a graph for one subtask keeps it.
         geometry: how perception finds it: "containment", "support", "" for neither.
         offered_by: tag of the things that take others in this relation.
@@ -73,6 +75,8 @@ class Predicate:
     camera: bool = True
     contains: bool = False
     group: str | None = None
+    symmetric: bool = False
+    mirrors: str = ""
     scored: bool = False
     geometry: str = ""
     offered_by: str = ""

@@ -144,6 +144,7 @@ def head_json(
     return {
         "task": task.name,
         "title": task.title,
+        "domain": task.domain,
         "goal": _goal_json(task.goal),
         "task_plan": task.plan.texts(),
         "task_plan_goal": task.plan.goal,
@@ -195,6 +196,7 @@ def _task(field: Field) -> Task:
         ),
         plan=plan(field["task_plan"], field["task_plan_goal"]),
         scene=_needs(field["scene"]),
+        domain=field["domain"].text(),
     )
 
 

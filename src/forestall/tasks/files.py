@@ -248,7 +248,8 @@ def _task(source: str, data: TaskFile, of: str) -> LoadedTask:
         for subtask in plan:
             for name in subtask.args:
                 domain[name]
-        task = Task(data.name, data.title, goal, plan, _scene(data.scene, domain))
+        scene = _scene(data.scene, domain)
+        task = Task(data.name, data.title, goal, plan, scene, domain.name)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     return LoadedTask(task, domain)
