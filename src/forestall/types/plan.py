@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from forestall.errors import InputError, UnknownNameError
+from forestall.errors import InputError
 from forestall.types.facts import category_of
 
 SKILLS: dict[str, tuple[str, ...]] = {
@@ -34,16 +34,6 @@ class Subtask:
     skill: str
     args: tuple[str, ...]
 
-    def __post_init__(self) -> None:
-        roles = SKILLS.get(self.skill)
-        if roles is None:
-            raise UnknownNameError("skill", self.skill, SKILLS)
-        if len(self.args) != len(roles):
-            raise InputError(
-                f"{self.skill} takes {len(roles)} argument(s) ({', '.join(roles)}), "
-                f"got {len(self.args)}: {', '.join(self.args)}"
-            )
-
     def __str__(self) -> str:
         return f"{self.skill}({', '.join(self.args)})"
 
@@ -52,7 +42,7 @@ class Subtask:
         """Read "put_in(Plate, Microwave)" or "(put_in, Plate, Microwave)".
 
         Raises:
-            InputError: the text is no subtask, the skill is unknown or its arguments do not fit.
+            InputError: the text is no subtask.
         """
         match = _TEXT.match(text)
         if match is None:
