@@ -80,7 +80,10 @@ class SymbolicWorld:
     def approach(self, name: str) -> float:
         """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
         found = self._state.matches(name)
-        return self._drive(found[0]) if found else 0.0
+        if not found or found[0] == self._state.held:
+            return 0.0
+        self._state.at = found[0]
+        return self._drive(found[0])
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; refuse with a reason when its needs are not met."""
@@ -91,8 +94,9 @@ class SymbolicWorld:
         command = Subtask(subtask.skill, args)
         skill = self._domain.skill(subtask.skill)
         names = self._domain.bound(command)
-        if args:
-            self._drive(names.get(skill.at or "", args[-1]))
+        target = names.get(skill.at or "", args[-1] if args else "")
+        if target in self._state.kinds and target not in {h for _, h in self._state.in_hands()}:
+            self._drive(target)
         after = apply(self._state, command)
         if isinstance(after, Refusal):
             return SkillOutcome(SkillStatus.REFUSED, self._time_s - started, after.reason)
@@ -160,9 +164,8 @@ class SymbolicWorld:
         return next(hand for hand, held in self._state.in_hands() if held == thing)
 
     def _drive(self, name: str) -> float:
-        """Come near a thing and face it."""
+        """Come near a thing."""
         x, y, _ = self._place_of(name)
-        self._state.at = name
         distance = math.dist(self._robot[:2], (x, y - REACH_M / 2))
         if distance <= REACH_M:
             return 0.0
