@@ -33,7 +33,7 @@ from forestall.errors import DomainError, FileFormatError, InputError, UnknownNa
 
 _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
-    "skills", "processes", "safety",
+    "skills", "processes", "safety", "constants", "spelling",
 )  # fmt: skip
 _CATEGORY = ("tags", "attributes", "defaults", "aliases", "words", "synonyms", "world")
 
@@ -67,6 +67,10 @@ def load_domain(name_or_file: str) -> Domain:
         FileFormatError: the file cannot be read.
         DomainError: something in it is wrong.
     """
+    if name_or_file.endswith(".pddl"):
+        from forestall.domain.pddl_in import load_pddl
+
+        return load_pddl(name_or_file)
     if not name_or_file.endswith(".toml"):
         return shipped(name_or_file)
     try:
@@ -137,6 +141,8 @@ def build_domain(data: Mapping[str, Any]) -> Domain:
         ),
         roles=_record(Roles, "roles", data.get("roles", {})),
         robot=_record(Robot, "robot", data.get("robot", {})),
+        constants=_pairs("constants", data),
+        spelling=_pairs("spelling", data),
     )
     check_domain(domain)
     return domain
@@ -362,6 +368,14 @@ def _record(kind: Any, label: str, data: Any) -> Any:
     table = as_table(label, data)
     _known(label, table, [f.name for f in fields(kind)])
     return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+
+
+def _pairs(key: str, data: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    table = as_table(key, data.get(key, {}))
+    for name, value in table.items():
+        if not isinstance(value, str):
+            raise _keyed(InputError(f"{key}: {name} must be a text"), f"[{key}]")
+    return tuple(table.items())
 
 
 def _known(label: str, table: Mapping[str, Any], known: Sequence[str]) -> None:

@@ -52,7 +52,7 @@ class Truth(Enum):
     UNOBSERVED = "unobserved"
 
 
-_TEXT = re.compile(r"^\s*(not\s+)?([a-z_]+)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]+))?\s*$")
+_TEXT = re.compile(r"^\s*(not\s+)?([a-z_][a-z0-9_]*)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]+))?\s*$")
 
 
 @dataclass(frozen=True, slots=True, order=True)
