@@ -257,16 +257,19 @@ class _Found(Declared):
                 predicates[n] |= {"kind": "derived", "definition": show(definitions[n])}
         return {
             "name": name,
-            "tags": [*tags, *sorted(self.tags)],
+            "tags": sorted({*tags, *self.tags}),
             "robot": {"hands": []},
             "predicates": predicates,
             "attributes": {a: {"values": list(t)} for a, t in self.grouped.items()},
             "categories": {
-                t: {"tags": [*several, *self.unions(t)], "attributes": attributes[t]}
+                t: {
+                    "tags": [*several, *self.unions(t)],
+                    "attributes": [a for a in self.grouped if a in attributes[t]],
+                }
                 for t, several in above.items()
             },
             "skills": skills,
-            "constants": dict(self.constants),
+            "constants": dict(sorted(self.constants.items())),
             "spelling": dict(sorted({**self.spelling, **self._value_names()}.items())),
         }
 
