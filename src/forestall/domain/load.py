@@ -185,8 +185,8 @@ def _open_facts(
 ) -> set[tuple[str, ...]]:
     spec = dict(domain.categories[name].extra).get(f"#{predicate}", ())
     assert isinstance(spec, tuple)
-    chosen = _chosen(domain, predicate, name, spec)
-    return {(name, other) for other in chosen if other in new}
+    found = chosen(domain, predicate, name, spec)
+    return {(name, other) for other in found if other in new}
 
 
 # --- predicates -----------------------------------------------------------------------------------
@@ -271,6 +271,7 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
         bins=bins,
         unit=table.get("unit", start.unit),
         words=table.get("words", start.words),
+        mined=table.get("mined", start.mined),
         lasting=table.get("lasting", start.lasting if base else bool(domain.categories)),
     )
 
@@ -322,14 +323,18 @@ def _facts(
 ) -> None:
     for predicate in _statics(domain):
         spec = _names(f"category {name}", predicate, table)
-        statics[predicate] |= {(name, x) for x in _chosen(domain, predicate, name, spec)}
+        statics[predicate] |= {(name, x) for x in chosen(domain, predicate, name, spec)}
     for word, predicate in _inverse(domain).items():
         spec = _names(f"category {name}", word, table)
-        statics[predicate] |= {(x, name) for x in _chosen(domain, word, name, spec)}
+        statics[predicate] |= {(x, name) for x in chosen(domain, word, name, spec)}
 
 
-def _chosen(domain: Domain, predicate: str, name: str, spec: Sequence[str]) -> set[str]:
-    """Categories of a list: names, "#tag" for all with a tag, "-Name" for all but."""
+def chosen(domain: Domain, predicate: str, name: str, spec: Sequence[str]) -> set[str]:
+    """Categories of a category's list: names, "#tag" for all with a tag, "-Name" for all but.
+
+    Raises:
+        UnknownNameError: a tag or category that does not exist.
+    """
     found: set[str] = set()
     for entry in (e for e in spec if not e.startswith("-")):
         if entry.startswith("#"):

@@ -9,6 +9,7 @@ itself is written as its opposite, which only needs "some".
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 from forestall.domain.formula import (
@@ -37,6 +38,15 @@ THING = "thing"
 
 Kinds = Mapping[str, str | None]
 """Variable → kind."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Happens:
+    """One fact of an effect, with the variables and the condition that it brings along as text."""
+
+    fact: str
+    variables: str = ""
+    condition: str = ""
 
 
 class Writer:
@@ -68,10 +78,11 @@ class Writer:
         top = self.top if top is None else top
         found = []
         for p in several:
-            kind = p.kind if p.kind is not None and self.is_type(p.kind) else None
-            of = top if kind is None else self.name(kind)
-            found.append(p.name if of == ROOT else f"{p.name} - {of}")
-        return " ".join(found)
+            typed = p.kind is not None and self.is_type(p.kind)
+            found.append((p.name, self.name(p.kind or "") if typed else top))
+        if all(kind == ROOT for _, kind in found):
+            return " ".join(name for name, _ in found)
+        return " ".join(f"{name} - {kind}" for name, kind in found)
 
     def tags_of(self, several: Iterable[Parameter]) -> tuple[Literal, ...]:
         """Conditions that stand for kinds which are no types."""
@@ -193,72 +204,66 @@ class Writer:
     # --- effects ---------------------------------------------------------------------------------
 
     def effects(self, effects: Iterable[Effect], kinds: Kinds) -> list[str]:
-        """What effects bring about, one text for each."""
+        """What effects bring about; a quantifier stands outside of every condition."""
         found = []
         for effect in effects:
             inner = {**kinds, **{v.name: v.kind for v in effect.variables}}
-            facts = [t for f in effect.facts for t in self._fact(f, inner)]
-            facts += [
-                t for c in effect.copies for t in self._copied(c.attribute, c.target, c.source)
-            ]
-            if not facts:
-                continue
-            text = facts[0] if len(facts) == 1 else f"(and {' '.join(facts)})"
-            condition: Formula = effect.condition
+            several: dict[tuple[str, str], list[str]] = {}
+            for happens in self._happens(effect, inner):
+                several.setdefault((happens.variables, happens.condition), []).append(happens.fact)
             tags = self.tags_of(effect.variables)
-            if tags:
-                condition = And(tags) if condition == TRUE else And((*tags, condition))
-            if condition != TRUE:
-                text = f"(when {self.formula(condition)} {text})"
-            if effect.variables:
-                text = f"(forall ({self.parameters(effect.variables)}) {text})"
-            found.append(text)
+            condition = And((*tags, effect.condition)) if tags else effect.condition
+            for (variables, own), facts in several.items():
+                text = facts[0] if len(facts) == 1 else f"(and {' '.join(facts)})"
+                parts = [] if condition == TRUE else [self.formula(condition)]
+                parts += [own] if own else []
+                if parts:
+                    both = parts[0] if len(parts) == 1 else f"(and {' '.join(parts)})"
+                    text = f"(when {both} {text})"
+                bound = f"{self.parameters(effect.variables)} {variables}".strip()
+                found.append(f"(forall ({bound}) {text})" if bound else text)
         return found
 
-    def _fact(self, fact: Literal, kinds: Kinds) -> Iterator[str]:
-        known = self.domain.predicates[fact.predicate]
-        if known.kind is PredicateKind.ATTRIBUTE:
-            text = self._set(known.name, fact.args[0], fact.value)
-            sure = self._surely_has(known.name, fact.args[0], kinds)
-            yield text if sure else f"(when (has_{known.name} {self._arg(fact.args[0])}) {text})"
-            return
-        yield self._literal(fact)
-        if fact.value == "false" or known.group is None:
-            return
-        for other in self.domain.relations.values():
-            if other.group == known.group:
-                yield self._ended(other.name, fact)
+    def _happens(self, effect: Effect, kinds: Kinds) -> Iterator[_Happens]:
+        for fact in effect.facts:
+            known = self.domain.predicates[fact.predicate]
+            if known.kind is PredicateKind.ATTRIBUTE:
+                sure = self._surely_has(known.name, fact.args[0], kinds)
+                has = "" if sure else f"(has_{known.name} {self._arg(fact.args[0])})"
+                yield from self._set(known.name, fact.args[0], fact.value, has)
+                continue
+            yield _Happens(self._literal(fact))
+            if fact.value != "false" and known.group is not None:
+                for other in self.domain.relations.values():
+                    if other.group == known.group and (other is not known or len(fact.args) > 1):
+                        yield self._ended(other.name, fact)
+        for copy in effect.copies:
+            has = f"(has_{copy.attribute} {self._arg(copy.target)})"
+            for value in self.domain.values(copy.attribute):
+                holds = self._literal(Literal(copy.attribute, (copy.source,), value))
+                yield from self._set(copy.attribute, copy.target, value, f"(and {has} {holds})")
+            none = f"(and {has} (not (has_{copy.attribute} {self._arg(copy.source)})))"
+            default = self.domain.values(copy.attribute)[0]
+            yield from self._set(copy.attribute, copy.target, default, none)
 
-    def _ended(self, other: str, fact: Literal) -> str:
+    def _ended(self, other: str, fact: Literal) -> _Happens:
         """Relations of a group end for the first argument, but for what comes to hold."""
         parameters = self.domain.predicates[other].parameters[1:]
         names = [f"?other{i or ''}" for i in range(len(parameters))]
         ends = self._literal(Literal(other, (fact.args[0], *names), "false"))
-        if not names:
-            return ends
-        typed = self.parameters((Parameter(n) for n in names), ROOT)
-        if other == fact.predicate:
-            same = [f"(= {n} {self._arg(a)})" for n, a in zip(names, fact.args[1:], strict=True)]
-            kept = same[0] if len(same) == 1 else f"(and {' '.join(same)})"
-            ends = f"(when (not {kept}) {ends})"
-        return f"(forall ({typed}) {ends})"
+        several = " ".join(f"{n} - {ROOT}" for n in names)
+        if other != fact.predicate:
+            return _Happens(ends, several)
+        same = [f"(= {n} {self._arg(a)})" for n, a in zip(names, fact.args[1:], strict=True)]
+        kept = same[0] if len(same) == 1 else f"(and {' '.join(same)})"
+        return _Happens(ends, several, f"(not {kept})")
 
-    def _set(self, attribute: str, thing: str, value: str) -> str:
-        arg = self._arg(thing)
-        texts = []
+    def _set(self, attribute: str, thing: str, value: str, condition: str) -> Iterator[_Happens]:
         for other in self.domain.values(attribute):
             name = self.value_name(attribute, other)
             if name:
-                texts.append(f"({name} {arg})" if other == value else f"(not ({name} {arg}))")
-        return texts[0] if len(texts) == 1 else f"(and {' '.join(texts)})"
-
-    def _copied(self, attribute: str, target: str, source: str) -> Iterator[str]:
-        has = f"(has_{attribute} {self._arg(target)})"
-        for value in self.domain.values(attribute):
-            holds = self._literal(Literal(attribute, (source,), value))
-            yield f"(when (and {has} {holds}) {self._set(attribute, target, value)})"
-        default = self._set(attribute, target, self.domain.values(attribute)[0])
-        yield f"(when (and {has} (not (has_{attribute} {self._arg(source)}))) {default})"
+                text = f"({name} {self._arg(thing)})"
+                yield _Happens(text if other == value else f"(not {text})", "", condition)
 
     def _surely_has(self, attribute: str, thing: str, kinds: Kinds) -> bool:
         constants = dict(self.domain.constants)
