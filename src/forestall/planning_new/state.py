@@ -219,7 +219,9 @@ class State:
         """What stands at a position of a relation, the rest being given."""
         if len(args) == 1:
             return [f[1] for f in self.facts if f[0] == predicate]
-        given = next(i for i in range(len(args)) if i != position)
+        given = next((i for i, a in enumerate(args) if i != position and a[0] != "?"), None)
+        if given is None:  # p(?x, ?x)
+            return sorted({f[1] for f in self.facts if f[0] == predicate and len({*f[1:]}) == 1})
         found = self._index.get((predicate, given, args[given]), ())
         return sorted(
             {
