@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -60,6 +61,11 @@ class Step:
     refused: bool
     reason: str
     truth: Mapping[Any, Any]
+
+    @cached_property
+    def middle(self) -> State | Refusal:
+        """What the domain makes of it before anything happens by itself."""
+        return unsettled(self.before, self.subtask)
 
     @property
     def differences(self) -> list[str]:
@@ -120,6 +126,12 @@ def play(episode: Episode, domain: Domain, coverage: Coverage | None = None) -> 
             with coverage.watching():
                 step = run.do(Subtask.parse(text))
             yield step
+
+
+def unsettled(state: State, subtask: Subtask) -> State | Refusal:
+    """What a skill does, without what happens by itself."""
+    with patch.object(execute, "settle", lambda state: None):
+        return execute.apply(state, subtask)
 
 
 def truth(kitchen: SmallKitchen) -> dict[Any, Any]:

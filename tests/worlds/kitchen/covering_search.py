@@ -116,32 +116,40 @@ def subtask(rng: np.random.Generator, state: State, tried: list[Subtask]) -> Sub
     return Subtask(skill.name, tuple(args))
 
 
-def blocks_anew(episode: Episode, state: State, step: Subtask) -> bool:
-    """Whether a put would bring a blocker back: where it then stands is a matter of geometry."""
-    if len(step.args) < 2:
-        return False
-    pairs = [(a, b) for a, b in episode.blocked.items() if step.args[0] in (a, b)]
-    others = {a if b == step.args[0] else b for a, b in pairs}
-    places = {o: state.place(o) for o in others}
-    return any(p is not None and p.parent == step.args[1] for p in places.values())
+def geometric(episode: Episode, state: State, step: Subtask) -> bool:
+    """Whether only geometry tells what a step leads to.
+
+    Where a blocker stands that is brought back, and what on the floor is within reach of an egg.
+    """
+    thing = step.args[0]
+    if step.skill == "pick_up" and state.domain.is_a(thing, "crackable"):
+        roots = [state.root(x) for x in (thing, state.at) if x in state.kinds]
+        return any(state.domain.is_a(r, state.domain.roles.ground) for r in roots)
+    others = {b if thing == a else a for a, b in episode.blocked.items() if thing in (a, b)}
+    places = {state.place(o) for o in others}
+    return len(step.args) > 1 and any(p is not None and p.parent == step.args[1] for p in places)
 
 
 def search(seconds: float, seed: int, domain: Domain) -> list[Episode]:
     """Episodes that cover what they can in a time."""
     rng, vocabulary, end = np.random.default_rng(seed), household(), time.monotonic() + seconds
     coverage, corpus = Coverage(domain), load_corpus() if CORPUS.exists() else []
-    left = list(mutants(domain))
-    for episode in corpus:
-        _, left = _worth([*play(episode, domain, coverage)], left)
+    played = [[*play(episode, domain, coverage)] for episode in corpus]
+    left: list[Mutant] | None = None
+    fresh = time.monotonic()
     said = time.monotonic()
-    while time.monotonic() < end and (coverage.open or left):
+    while time.monotonic() < end and (coverage.open or left is None or left):
+        if left is None and time.monotonic() - fresh > seconds / 6:
+            left = list(mutants(domain))
+            for known in played:
+                _, left = _worth(known, left)
         run = Run(start(rng, vocabulary), domain)
         coverage.begin()
         done: list[Step] = []
         useful, tried = 0, []
         for _ in range(STEPS):
             chosen = subtask(rng, run.state, tried)
-            if blocks_anew(run.episode, run.state, chosen):
+            if geometric(run.episode, run.state, chosen):
                 continue
             tried.append(chosen)
             before = len(coverage.open)
@@ -152,15 +160,18 @@ def search(seconds: float, seed: int, domain: Domain) -> list[Episode]:
                 print(json.dumps(asdict(Episode(run.episode.things, run.episode.blocked, steps))))
                 raise SystemExit("\n".join(done[-1].differences))
             useful = len(done) if len(coverage.open) < before else useful
-        last, left = _worth(done, left)
-        useful = max(useful, last)
+        fresh = time.monotonic() if useful else fresh
+        if left is not None:
+            last, left = _worth(done, left)
+            useful = max(useful, last)
         if useful:
+            played.append(done[:useful])
             steps = tuple(str(s.subtask) for s in done[:useful])
             corpus.append(Episode(run.episode.things, run.episode.blocked, steps))
         if time.monotonic() - said > 10:
             said = time.monotonic()
-            print(f"{len(corpus)} episodes, {len(coverage.open)} cases, {len(left)} mutants left")
-    print("\n".join(["not covered:", *sorted(coverage.open), "alive:", *(str(m) for m in left)]))
+            print(f"{len(corpus)} episodes, {len(coverage.open)} cases, {len(left or ())} mutants left")
+    print("\n".join(["not covered:", *sorted(coverage.open), "alive:", *(str(m) for m in left or ())]))
     return corpus
 
 
@@ -197,4 +208,5 @@ if __name__ == "__main__":
     limit = float(sys.argv[1]) if len(sys.argv) > 1 else 120.0
     number = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     household_domain = shipped("household")
-    write(smallest(search(limit, number, household_domain), household_domain))
+    write(search(limit, number, household_domain))
+    write(smallest(load_corpus(), household_domain))

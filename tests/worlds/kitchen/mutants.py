@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from covering import Step, belief
+from covering import Step, belief, unsettled
 
 from forestall.domain.formula import (
     TRUE,
@@ -27,6 +27,8 @@ from forestall.domain.formula import (
 from forestall.domain.model import Choice, Domain, Effect, Make, Process, Skill
 from forestall.errors import ForestallError
 from forestall.planning_new.execute import Refusal, apply
+from forestall.planning_new.settle import settle
+from forestall.planning_new.state import State
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ class Mutant:
         kind: "need", "effect" and "process" where all of one is missing, else "part".
         skill: the only skill that it can change, if there is one.
         later: whether it shows only in what is done later.
+        settling: whether it changes nothing but what happens by itself.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Mutant:
     kind: str = "part"
     skill: str | None = None
     later: bool = False
+    settling: bool = False
 
     def __str__(self) -> str:
         return self.name
@@ -53,26 +57,53 @@ class Mutant:
 
 def kills(mutant: Mutant, steps: Sequence[Step]) -> int:
     """The number of the first step that shows a mutant, 0 where none does."""
-    state = None
+    if mutant.later:
+        return _kills_later(mutant, steps)
     for number, step in enumerate(steps, 1):
-        if mutant.skill not in (None, step.subtask.skill) and not mutant.later:
-            continue
-        before = step.before
-        if not mutant.later or state is None:
-            state = before.copy()
-            state.domain = mutant.domain
-        try:
-            after = apply(state, step.subtask)
-        except (ForestallError, RecursionError):
+        if mutant.skill in (None, step.subtask.skill) and _shows(mutant, step):
             return number
+    return 0
+
+
+def _shows(mutant: Mutant, step: Step) -> bool:
+    """Whether one step from the true state leads elsewhere."""
+    try:
+        if mutant.settling:
+            if isinstance(step.middle, Refusal):
+                return False
+            after: State | Refusal = step.middle.copy()
+        else:
+            before = step.before.copy()
+            before.domain = mutant.domain
+            after = unsettled(before, step.subtask)
+        if isinstance(after, Refusal) or isinstance(step.middle, Refusal):
+            return isinstance(after, Refusal) != isinstance(step.middle, Refusal)
+        if mutant.skill is not None and _same(after, step.middle):
+            return False
+        after.domain = mutant.domain
+        settle(after)
+    except (ForestallError, RecursionError):
+        return True
+    return not _same(after, step.after) and belief(after) != step.truth
+
+
+def _same(state: State, other: State | Refusal) -> bool:
+    assert isinstance(other, State)
+    return (state.values, state.facts) == (other.values, other.facts)
+
+
+def _kills_later(mutant: Mutant, steps: Sequence[Step]) -> int:
+    if not steps:
+        return 0
+    state = steps[0].before.copy()
+    state.domain = mutant.domain
+    for number, step in enumerate(steps, 1):
+        after = apply(state, step.subtask)
         if isinstance(after, Refusal) != step.refused:
             return number
-        if not isinstance(after, Refusal):
-            assert not isinstance(step.after, Refusal)
-            if (after.values, after.facts) != (step.after.values, step.after.facts):
-                if belief(after) != step.truth:
-                    return number
-            state = after
+        state = state if isinstance(after, Refusal) else after
+        if belief(state) != step.truth:
+            return number
     return 0
 
 
@@ -120,11 +151,12 @@ def mutants(domain: Domain) -> Iterator[Mutant]:
             yield Mutant(label, replace(domain, skills=skills), kind, skill.name, later)
     for i, process in enumerate(domain.processes):
         others = (*domain.processes[:i], *domain.processes[i + 1 :])
-        yield Mutant(f"process {process.name}", replace(domain, processes=others), "process")
+        whole = replace(domain, processes=others)
+        yield Mutant(f"process {process.name}", whole, "process", settling=True)
         for name, kind, less in _of_process(process):
             several = (*domain.processes[:i], less, *domain.processes[i + 1 :])
             label = f"process {process.name}: {name}"
-            yield Mutant(label, replace(domain, processes=several), kind)
+            yield Mutant(label, replace(domain, processes=several), kind, settling=True)
     for predicate in domain.derived.values():
         assert predicate.definition is not None
         for what, definition in lessened(predicate.definition):
