@@ -1,9 +1,11 @@
 """Searches the episodes that cover the household's domain file, and writes them down.
 
-    PYTHONPATH=tests/worlds/kitchen python tests/worlds/kitchen/covering_search.py [SECONDS] [SEED]
+    PYTHONPATH=tests/worlds/kitchen python tests/worlds/kitchen/covering_search.py \\
+        [SECONDS] [SEED] [mutants] [smallest]
 
 Random starts and random subtasks, inclined towards what can be executed. An episode is kept, up to
-its last useful step, where it covers a case that no other does or kills a mutant that survived.
+its last useful step, where it covers a case that no other does or (with "mutants") kills a mutant that
+survived; with "smallest" those that later ones make needless are left out in the end.
 What is in the corpus already stays. Stops with the episode in hand where the kitchen and the domain
 file disagree.
 """
@@ -130,19 +132,14 @@ def geometric(episode: Episode, state: State, step: Subtask) -> bool:
     return len(step.args) > 1 and any(p is not None and p.parent == step.args[1] for p in places)
 
 
-def search(seconds: float, seed: int, domain: Domain) -> list[Episode]:
-    """Episodes that cover what they can in a time."""
+def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> list[Episode]:
+    """Episodes that cover what they can in a time, and kill what they can of some mutants."""
     rng, vocabulary, end = np.random.default_rng(seed), household(), time.monotonic() + seconds
     coverage, corpus = Coverage(domain), load_corpus() if CORPUS.exists() else []
-    played = [[*play(episode, domain, coverage)] for episode in corpus]
-    left: list[Mutant] | None = None
-    fresh = time.monotonic()
-    said = time.monotonic()
-    while time.monotonic() < end and (coverage.open or left is None or left):
-        if left is None and time.monotonic() - fresh > seconds / 6:
-            left = list(mutants(domain))
-            for known in played:
-                _, left = _worth(known, left)
+    for episode in corpus:
+        _, left = _worth([*play(episode, domain, coverage)], left)
+    said = 0.0
+    while time.monotonic() < end and (coverage.open or left):
         run = Run(start(rng, vocabulary), domain)
         coverage.begin()
         done: list[Step] = []
@@ -158,20 +155,19 @@ def search(seconds: float, seed: int, domain: Domain) -> list[Episode]:
             if done[-1].differences:
                 steps = tuple(str(s.subtask) for s in done)
                 print(json.dumps(asdict(Episode(run.episode.things, run.episode.blocked, steps))))
+                write(corpus)
                 raise SystemExit("\n".join(done[-1].differences))
             useful = len(done) if len(coverage.open) < before else useful
-        fresh = time.monotonic() if useful else fresh
-        if left is not None:
-            last, left = _worth(done, left)
-            useful = max(useful, last)
+        last, left = _worth(done, left)
+        useful = max(useful, last)
         if useful:
-            played.append(done[:useful])
             steps = tuple(str(s.subtask) for s in done[:useful])
             corpus.append(Episode(run.episode.things, run.episode.blocked, steps))
         if time.monotonic() - said > 10:
             said = time.monotonic()
-            print(f"{len(corpus)} episodes, {len(coverage.open)} cases, {len(left or ())} mutants left")
-    print("\n".join(["not covered:", *sorted(coverage.open), "alive:", *(str(m) for m in left or ())]))
+            print(f"{len(corpus)} episodes, {len(coverage.open)} cases, {len(left)} mutants left")
+            sys.stdout.flush()
+    print("\n".join(["not covered:", *sorted(coverage.open), "alive:", *(str(m) for m in left)]))
     return corpus
 
 
@@ -208,5 +204,7 @@ if __name__ == "__main__":
     limit = float(sys.argv[1]) if len(sys.argv) > 1 else 120.0
     number = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     household_domain = shipped("household")
-    write(search(limit, number, household_domain))
-    write(smallest(load_corpus(), household_domain))
+    wanted = list(mutants(household_domain)) if "mutants" in sys.argv else []
+    write(search(limit, number, household_domain, wanted))
+    if "smallest" in sys.argv:
+        write(smallest(load_corpus(), household_domain))
