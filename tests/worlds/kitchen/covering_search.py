@@ -25,8 +25,10 @@ from mutants import Mutant, kills, mutants
 from forestall.domain.evaluate import TRUE, evaluate
 from forestall.domain.formula import free
 from forestall.domain.load import shipped
-from forestall.domain.model import Domain
+from forestall.domain.model import Domain, Skill
+from forestall.planning_new.execute import Refusal, apply
 from forestall.planning_new.state import State
+from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 from forestall.vocabulary import Vocabulary, household
 
@@ -96,17 +98,28 @@ def _any(rng: np.random.Generator, among: Sequence[str]) -> str:
     return among[int(rng.integers(len(among)))]
 
 
-def subtask(rng: np.random.Generator, state: State, tried: list[Subtask]) -> Subtask:
-    """A random subtask, mostly one whose fixed needs hold; at times one that was tried before."""
-    if tried and rng.random() < 0.12:
-        return tried[int(rng.integers(len(tried)))]
+def intended(rng: np.random.Generator, state: State) -> list[Subtask]:
+    """What to do next: mostly a subtask whose fixed needs hold, after what it lacks."""
+    held, domain = state.held, state.domain
+    if held is not None and domain.is_a(held, "crackable") and rng.random() < 0.3:
+        faced = [n for n in sorted(state.kinds) if n != held]
+        return [Subtask("navigate_to_obj", (_any(rng, faced),)), Subtask("crack_obj", (held,))]
+    skills = [*sorted(domain.skills), "slice_obj", "pour", "put_in", "put_on"]
+    skill = domain.skills[_any(rng, skills)]
+    wanted = Subtask(skill.name, _arguments(rng, state, skill))
+    refusal = apply(state, wanted)
+    if not isinstance(refusal, Refusal) or rng.random() < 0.3:
+        return [wanted]
+    return [wanted, *(s for x in refusal.lacking for s in _towards(rng, state, x)), wanted]
+
+
+def _arguments(rng: np.random.Generator, state: State, skill: Skill) -> tuple[str, ...]:
     names, domain = sorted(state.kinds), state.domain
-    skill = domain.skills[_any(rng, sorted(domain.skills))]
     wild = rng.random() < 0.1
     for _ in range(60):
         args = [_any(rng, names) for _ in skill.parameters]
         for i, parameter in enumerate(skill.parameters):
-            if parameter.name == skill.hand and state.held is not None and rng.random() < 0.9:
+            if parameter.name == skill.hand and state.held is not None and rng.random() < 0.8:
                 args[i] = state.held
         bound = {p.name: a for p, a in zip(skill.parameters, args, strict=True)}
         for choice in skill.choices:
@@ -115,7 +128,36 @@ def subtask(rng: np.random.Generator, state: State, tried: list[Subtask]) -> Sub
         asked = [f for f in asked if free(f) <= set(bound)]
         if wild or all(evaluate(f, state, bound) == TRUE for f in asked):
             break
-    return Subtask(skill.name, tuple(args))
+    return tuple(args)
+
+
+def _towards(rng: np.random.Generator, state: State, lacking: Literal) -> list[Subtask]:
+    """Steps that may bring about a fact."""
+    thing, value = (lacking.args or ("",))[0], lacking.value
+    if lacking.predicate == "open":
+        return [Subtask("open_obj" if value == "open" else "close_obj", (thing,))]
+    if lacking.predicate == "toggled":
+        return [Subtask(f"toggle_{value}", (thing,))]
+    if lacking.predicate == "held_by" and state.matches(thing):
+        return [*_away(rng, state, state.held), Subtask("pick_up", state.matches(thing)[:1])]
+    if lacking.predicate == "hand_empty":
+        return _away(rng, state, state.held)
+    if lacking.predicate == "filled" and state.held == thing:
+        water = [Subtask("put_in", (thing, "Sink-1")), Subtask("toggle_on", ("Faucet-1",))]
+        return [*water, Subtask("pick_up", (thing,))]
+    if lacking.predicate in ("vacant", "unblocked"):
+        blocking = [f[1] for f in state.facts if f[0] == "blocking" and f[2] == thing]
+        first = [*blocking, *state.contents(thing)][:1]
+        moved = [Subtask("pick_up", (x,)) for x in first] + _away(rng, state, *first)
+        back = [] if state.held is None else [Subtask("pick_up", (state.held,))]
+        return [*_away(rng, state, state.held), *moved, *back]
+    return []
+
+
+def _away(rng: np.random.Generator, state: State, thing: str | None = None) -> list[Subtask]:
+    takes = [] if thing is None else [p for p in sorted(state.kinds)
+                                      if state.domain.static("accepts", p, thing)]  # fmt: skip
+    return [Subtask("put_on", (str(thing), _any(rng, takes)))] if takes else []
 
 
 def geometric(episode: Episode, state: State, step: Subtask) -> bool:
@@ -143,12 +185,13 @@ def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> lis
         run = Run(start(rng, vocabulary), domain)
         coverage.begin()
         done: list[Step] = []
-        useful, tried = 0, []
+        agenda: list[Subtask] = []
+        useful = 0
         for _ in range(STEPS):
-            chosen = subtask(rng, run.state, tried)
+            agenda = agenda or intended(rng, run.state)
+            chosen = agenda.pop(0)
             if geometric(run.episode, run.state, chosen):
                 continue
-            tried.append(chosen)
             before = len(coverage.open)
             with coverage.watching():
                 done.append(run.do(chosen))
