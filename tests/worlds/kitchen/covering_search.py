@@ -62,7 +62,7 @@ def start(rng: np.random.Generator, vocabulary: Vocabulary) -> Episode:
             if vocabulary.accepts(place, name) and (
                 kind is None or kind.capacity is None or inside < kind.capacity
             ):
-                places += [place] * (1 if kind is None or kind.capacity is None else 3)
+                places += [place] * (4 if place in written else 1)
         written[name] = _any(rng, places)
     shown = [
         *(f"{n}@{p}{_states(rng, n, vocabulary, 0.3)}" for n, p in written.items()),
@@ -100,10 +100,19 @@ def _any(rng: np.random.Generator, among: Sequence[str]) -> str:
 
 def intended(rng: np.random.Generator, state: State) -> list[Subtask]:
     """What to do next: mostly a subtask whose fixed needs hold, after what it lacks."""
-    held, domain = state.held, state.domain
-    if held is not None and domain.is_a(held, "crackable") and rng.random() < 0.3:
-        faced = [n for n in sorted(state.kinds) if n != held]
-        return [Subtask("navigate_to_obj", (_any(rng, faced),)), Subtask("crack_obj", (held,))]
+    held, domain, names = state.held, state.domain, sorted(state.kinds)
+    tools = [n for n in names if domain.is_a(n, "crackable") or domain.is_a(n, "cuts")]
+    if held is None and tools and rng.random() < 0.2:
+        return [Subtask("pick_up", (_any(rng, tools),))]
+    if held is not None and domain.is_a(held, "crackable") and rng.random() < 0.5:
+        around = [p for n in names if domain.is_a(n, "has_dirty") for p in (n, state.root(n))]
+        faced = _any(rng, names if not around or rng.random() < 0.4 else around)
+        return [Subtask("navigate_to_obj", (faced,)), Subtask("crack_obj", (held,))]
+    if held is not None and domain.is_a(held, "cuts") and rng.random() < 0.3:
+        whole = [n for n in names if domain.is_a(n, "sliceable")]
+        return [Subtask("slice_obj", (_any(rng, whole or names),))]
+    if held is not None and rng.random() < 0.03:
+        return [Subtask("pour", (held, held))]
     skills = [*sorted(domain.skills), "slice_obj", "pour", "put_in", "put_on"]
     skill = domain.skills[_any(rng, skills)]
     wanted = Subtask(skill.name, _arguments(rng, state, skill))
