@@ -1,7 +1,7 @@
 """Searches the episodes that cover the household's domain file, and writes them down.
 
     PYTHONPATH=tests/worlds/kitchen python tests/worlds/kitchen/covering_search.py \\
-        [SECONDS] [SEED] [mutants] [smallest]
+        [SECONDS] [SEED] [parts] [smallest]
 
 Random starts and random subtasks, inclined towards what can be executed. An episode is kept, up to
 its last useful step, where it covers a case that no other does or (with "mutants") kills a mutant that
@@ -20,6 +20,7 @@ from dataclasses import asdict
 
 import numpy as np
 from covering import CORPUS, Coverage, Episode, Run, Step, fixed, load_corpus, play
+from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 
 from forestall.domain.evaluate import TRUE, evaluate
@@ -234,10 +235,10 @@ def _worth(steps: list[Step], left: list[Mutant]) -> tuple[int, list[Mutant]]:
     return last, alive
 
 
-def smallest(corpus: list[Episode], domain: Domain) -> list[Episode]:
+def smallest(corpus: list[Episode], domain: Domain, left: list[Mutant]) -> list[Episode]:
     """The episodes without those that the later ones make needless."""
     kept: list[Episode] = []
-    coverage, left = Coverage(domain), list(mutants(domain))
+    coverage = Coverage(domain)
     for episode in reversed(corpus):
         before, alive = len(coverage.open), len(left)
         _, left = _worth([*play(episode, domain, coverage)], left)
@@ -256,7 +257,8 @@ if __name__ == "__main__":
     limit = float(sys.argv[1]) if len(sys.argv) > 1 else 120.0
     number = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     household_domain = shipped("household")
-    wanted = list(mutants(household_domain)) if "mutants" in sys.argv else []
+    wanted = [m for m in mutants(household_domain) if why_equivalent(str(m)) is None]
+    wanted = [m for m in wanted if m.kind != "part" or "parts" in sys.argv]
     write(search(limit, number, household_domain, wanted))
     if "smallest" in sys.argv:
-        write(smallest(load_corpus(), household_domain))
+        write(smallest(load_corpus(), household_domain, wanted))

@@ -7,6 +7,8 @@ that behave like the whole domain. Keys are patterns over names; the first that 
 
 from __future__ import annotations
 
+import re
+
 _LOST = "the kitchen's truth knows where everything is: nothing in it is ever lost"
 _LIQUID = "what holds liquid has things inside it, and never on top of it"
 _DEVICE = "basins and devices that fill have things inside them, and never on top of them"
@@ -57,4 +59,15 @@ UNREACHABLE: dict[str, str] = {
         "slices are sliced, cooked or not",
 }  # fmt: skip
 
-EQUIVALENT: dict[str, str] = {}
+EQUIVALENT: dict[str, str] = {
+    r".*: need \d+ \[located\(.*": _LOST,
+    r"put_(in|on): need 5 \[not within.*": _NESTED,
+    r"(crack|slice)_obj: effect (6|7)( .*|:.*)?": _LIQUID,
+    r"crack_obj: effect (4|8|12|16)(:.*)?": _FRESH,
+    r"crack_obj: effect (14|15)(:.*)?": _LIQUID,
+}
+
+
+def why_equivalent(name: str) -> str | None:
+    """Why nothing can tell a mutant from the whole domain; None where something could."""
+    return next((why for pattern, why in EQUIVALENT.items() if re.fullmatch(pattern, name)), None)

@@ -16,13 +16,12 @@ help, what a plan prefers, safety rules, words and phrases.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Sequence
 
 from catalogue import differences, lacking
 from covering import Step, load_corpus, play
-from equivalent import EQUIVALENT
+from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 
 from forestall.domain.load import shipped
@@ -38,11 +37,6 @@ def played(domain: Domain) -> list[list[Step]]:
 def survivors(several: Iterable[Mutant], episodes: Sequence[Sequence[Step]]) -> list[str]:
     """Names of the mutants that no episode kills."""
     return [str(m) for m in several if not any(kills(m, steps) for steps in episodes)]
-
-
-def why_equivalent(name: str) -> str | None:
-    """Why nothing can tell a mutant from the whole domain; None where something could."""
-    return next((why for pattern, why in EQUIVALENT.items() if re.fullmatch(pattern, name)), None)
 
 
 def main() -> int:

@@ -12,9 +12,9 @@ import pytest
 from catalogue import TAGS, differences, lacking
 from covering import Coverage, Run, Step, cases, load_corpus, play
 from covering_search import geometric, intended, start
-from equivalent import EQUIVALENT, UNREACHABLE
+from equivalent import EQUIVALENT, UNREACHABLE, why_equivalent
 from mutants import mutants
-from mutate_domain import survivors, why_equivalent
+from mutate_domain import survivors
 
 from forestall.domain.load import shipped
 from forestall.vocabulary import household
