@@ -129,6 +129,7 @@ class Runtime:
             end = self._loop(episode)
         except Exception as error:  # noqa: BLE001 - whatever breaks, what came before is kept
             broken = error
+        known = (*provenance, ("perception", self._perceiver.describe()))
         record = EpisodeRecord(
             task=task,
             scenario=scenario,
@@ -143,10 +144,7 @@ class Runtime:
             simulated_s=episode.time_s,
             compute_s=monitor.seconds,
             final=monitor.final,
-            provenance=tuple(
-                (name, plain(value))
-                for name, value in (*provenance, ("perception", self._perceiver.describe()))
-            ),
+            provenance=tuple((name, plain(value)) for name, value in known),
         )
         if score is not None and broken is None:
             record = score(record)
