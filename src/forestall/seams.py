@@ -25,7 +25,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
-from forestall.types.task import Goal, Task
+from forestall.types.task import Goal
 from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
 
 
@@ -287,8 +287,8 @@ class Strategy(Protocol):
 class Listener(Protocol):
     """Records, pages, progress; cannot change an episode."""
 
-    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
-        """The episode begins."""
+    def on_start(self, record: EpisodeRecord) -> None:
+        """The episode begins: what is known before it, without a boundary and without an end."""
 
     def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged: its record, and what was known."""

@@ -61,7 +61,7 @@ def run(
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
     """
-    from forestall.build import RunConfig, prepare, provenance, run_episode
+    from forestall.build import RunConfig, prepare, run_episode
     from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
     from forestall.records.record import RunRecorder, read_record
@@ -88,13 +88,7 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     demonstrations, used = _memory(config, memory, quiet)
     page = folder / "index.html"
-    recorder = RunRecorder(
-        folder,
-        scenario=name,
-        strategy=strategy,
-        provenance={**dict(provenance(config)), "memory": used},
-        page=str(page),
-    )
+    recorder = RunRecorder(folder, page=str(page))
     with ProgressLine(quiet=quiet) as line:
         record = run_episode(prepared, demonstrations, [recorder, line], used)
     write_page(record, page)
