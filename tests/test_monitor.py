@@ -7,11 +7,18 @@ from dataclasses import replace
 
 import pytest
 
+from forestall.assembly.configuration import run_config
 from forestall.conclusion import MonitorConfig
 from forestall.domain.load import shipped
 from forestall.errors import InputError, PerceptionError
 from forestall.monitor import Monitor
+from forestall.assembly.make import make_strategy
+from forestall.perception.config import ScopeConfig
+from forestall.perception.scope import scope
 from forestall.strategies.none import NoReplanning
+from forestall.tasks.faults import apply_scene_faults
+from forestall.tasks.files import load_scenario, load_task
+from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.decision import Hold, Outcome
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import GRIPPER, Literal
@@ -26,6 +33,8 @@ from forestall.types.verdict import (
     ReplanOutcome,
     Verdict,
 )
+from forestall.worlds.kitchen.flat_world import flat_environment
+from test_runtime import memory
 
 PLAN = Plan.parse(["pick_up(Mug)", "put_in(Mug, Sink)"], "a mug in the sink")
 DONE = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)
@@ -355,3 +364,36 @@ def test_starting_again_forgets() -> None:
 def test_a_policy_or_a_bound_that_cannot_be(config: dict[str, object]) -> None:
     with pytest.raises(InputError, match=next(iter(config))):
         MonitorConfig(**config)  # type: ignore[arg-type]
+
+
+def test_the_real_strategy_on_graphs_of_the_callers_own() -> None:
+    """An executive that owns the robot: the microwave is occupied, and is emptied first."""
+    loaded = load_task("heat-potato")
+    faults = load_scenario("microwave-occupied").faults
+    needs = apply_scene_faults(loaded.task.scene, faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    kitchen.reset(3)
+    monitor = Monitor(
+        make_strategy(RunConfig("heat-potato", seed=3), loaded.domain, memory()),
+        loaded.domain,
+        config=MonitorConfig(on_alarm="proceed"),
+        scope=lambda graph, subtask: scope(graph, subtask, loaded.domain, ScopeConfig()),
+    )
+    monitor.start(loaded.task)
+    outcomes = []
+    while not monitor.finished:
+        place = monitor.approach()
+        if place is not None:
+            kitchen.approach(place)
+        decision = monitor.before(kitchen.oracle.truth())
+        outcomes.append(decision.outcome)
+        if decision.may_start:
+            assert decision.command is not None
+            monitor.after(kitchen.execute(decision.command))
+        else:
+            assert decision.outcome is Outcome.REPLAN, decision.why
+            assert decision.diagnosis is not None and "Bowl-1" in decision.diagnosis.cause
+    assert outcomes.count(Outcome.REPLAN) == 1
+    assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in monitor.executed)
+    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    assert strict, why
