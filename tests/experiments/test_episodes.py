@@ -22,6 +22,7 @@ TOAST = Experiment(
     Episodes(("toast-bread",), ("knife-blocked",), ("none",), (1, 2)),
     settings=Settings(pages="none"),
     kind=KIND,
+    engine="inline",
 )
 
 
