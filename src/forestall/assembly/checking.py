@@ -10,6 +10,7 @@ from pathlib import Path
 
 from forestall.assembly.configuration import Given, choices
 from forestall.assembly.make import STORED_STATES
+from forestall.assembly.options import built
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import find, known
 from forestall.errors import UnknownNameError
@@ -24,6 +25,7 @@ from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Decision, Diagnosis, Verdict
+from forestall.vocabulary import Vocabulary
 
 TRUTH_STATES = "oracle"
 """The simulator's own, which no stored observation has."""
@@ -58,7 +60,7 @@ def judge_stored(
         raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)
     loaded = None if task is None else load_task(task)
     domain = find(DOMAIN.name, names[DOMAIN.name])
-    vocabulary = domain.factory() if loaded is None else loaded.vocabulary
+    vocabulary: Vocabulary = built(domain, {}, None) if loaded is None else loaded.vocabulary
     wanted = Subtask.parse(subtask)
     for name in wanted.args:
         vocabulary[name]
