@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from forestall.assembly.configuration import run_config
+from forestall.assembly.make import make_strategy
 from forestall.conclusion import MonitorConfig
 from forestall.domain.load import shipped
 from forestall.errors import InputError, PerceptionError
 from forestall.monitor import Monitor
-from forestall.assembly.make import make_strategy
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.strategies.none import NoReplanning

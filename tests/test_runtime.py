@@ -73,7 +73,7 @@ def play(
     kitchen = flat_environment(needs, loaded.domain)
 
     def score(record: EpisodeRecord) -> EpisodeRecord:
-        strict, weak, why = TruthGoalChecker().check(record.task.goal, kitchen.oracle)
+        strict, weak, why = TruthGoalChecker(loaded.domain).check(record.task.goal, kitchen.oracle)
         return replace(record, success=strict, weak_success=weak, failures=why)
 
     runtime = Runtime(
@@ -83,7 +83,7 @@ def play(
         loaded.domain,
         config=limits,
     )
-    plan = apply_plan_faults(loaded.task.plan, faults)
+    plan = apply_plan_faults(loaded.task.plan, faults, loaded.domain)
     return runtime.run(loaded.task, plan, config.seed, config.scenario, score)
 
 

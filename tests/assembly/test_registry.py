@@ -15,10 +15,10 @@ from forestall.assembly.configuration import Given, choices, run_config
 from forestall.assembly.options import declared
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import TABLES, default, find, known
+from forestall.domain.load import shipped
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, SEGMENTER
 from forestall.types.kind import Kind
-from forestall.domain.load import shipped
 
 OWN = '''
 class Calm:
@@ -123,7 +123,7 @@ def test_what_does_not_work_is_named_with_its_package(plugin: None, name: str, w
 
 
 def test_options_of_others_are_checked_like_ours(plugin: None) -> None:
-    with pytest.raises(UnknownNameError, match="patence.*did you mean patience"):
+    with pytest.raises(UnknownNameError, match=r"patence.*did you mean patience"):
         made(detector={"name": "borrowing", "patence": 7})
     with pytest.raises(InputError, match=r"patience of the detector 'borrowing'.*'many'"):
         made(detector={"name": "borrowing", "patience": "many"})

@@ -10,6 +10,7 @@ from forestall.assembly.configuration import run_config
 from forestall.assembly.make import make_strategy, prepare
 from forestall.assembly.parts import Assembly
 from forestall.cli.main import call
+from forestall.domain.load import shipped
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import IMAGE_ENCODER, STATES
@@ -17,7 +18,6 @@ from forestall.training import shards
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.plan import Subtask
-from forestall.domain.load import shipped
 
 
 @pytest.fixture

@@ -16,6 +16,8 @@ from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 
+pytestmark = pytest.mark.simulator
+
 NEEDS = SceneNeeds(
     objects=(
         ObjectNeed("Plate-1", "Plate", ("CounterTop", "DiningTable")),

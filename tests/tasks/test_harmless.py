@@ -13,6 +13,8 @@ from forestall.types.episode import SkillStatus
 from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 
+pytestmark = pytest.mark.simulator
+
 NAMES = scenario_names("harmless")
 KINDS = {
     *("clutter", "layout", "furniture", "colours", "light", "viewpoint"),

@@ -117,9 +117,7 @@ def task_names(domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
     return tuple(sorted(n for n, _, d in _shipped("tasks") if domain in (None, d)))
 
 
-def scenario_names(
-    of: str | None = None, domain: str | None = DEFAULT_DOMAIN
-) -> tuple[str, ...]:
+def scenario_names(of: str | None = None, domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
     """Names of the shipped scenarios of a domain (None: of all), of one set or of all.
 
     Raises:

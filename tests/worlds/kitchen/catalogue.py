@@ -14,7 +14,7 @@ from typing import Any
 from mutants import Mutant
 
 from forestall.domain.model import Domain
-from forestall.vocabulary import Category, Receptacle, Vocabulary
+from forestall.vocabulary import Category, Receptacle, Domain
 from forestall.worlds.kitchen.skills import KNIFE
 
 
@@ -59,7 +59,7 @@ TAGS: Mapping[str, Callable[[Category], bool]] = {
 """Tag → the categories of the catalogue that must carry it."""
 
 
-def _pairs(vocabulary: Vocabulary) -> dict[str, set[tuple[str, str]]]:
+def _pairs(vocabulary: Domain) -> dict[str, set[tuple[str, str]]]:
     """Every static relation as the catalogue has it."""
     every = vocabulary.categories
     one = {
@@ -74,7 +74,7 @@ def _pairs(vocabulary: Vocabulary) -> dict[str, set[tuple[str, str]]]:
     return found
 
 
-def differences(domain: Domain, vocabulary: Vocabulary) -> Iterator[str]:
+def differences(domain: Domain, vocabulary: Domain) -> Iterator[str]:
     """What the domain file says otherwise than the catalogue."""
     if set(domain.categories) != set(vocabulary.categories):
         yield f"categories: {set(domain.categories) ^ set(vocabulary.categories)}"

@@ -31,7 +31,8 @@ from forestall.planning_new.execute import Refusal, apply
 from forestall.planning_new.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
-from forestall.vocabulary import Vocabulary, household
+from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 
 THINGS = (
     "Mug-1", "Mug-2", "Cup-1", "Bowl-1", "Bowl-2", "Plate-1", "Plate-2", "Pot-1", "Pan-1", "Kettle-1",
@@ -49,7 +50,7 @@ SOMETIMES = ("Sink-2", "Faucet-2", "Faucet-3", "StoveKnob-7", "Fridge-2")
 STEPS = 40
 
 
-def start(rng: np.random.Generator, vocabulary: Vocabulary) -> Episode:
+def start(rng: np.random.Generator, vocabulary: Domain) -> Episode:
     """Some things at places that take them, in any states, some in front of others."""
     extra = [f for f in SOMETIMES if rng.random() < 0.15]
     fixtures = [*FIXTURES, *(f for f in extra if vocabulary[f].receptacle is not None)]
@@ -83,7 +84,7 @@ def start(rng: np.random.Generator, vocabulary: Vocabulary) -> Episode:
     return Episode(tuple(shown), blocked)
 
 
-def _states(rng: np.random.Generator, name: str, vocabulary: Vocabulary, share: float) -> str:
+def _states(rng: np.random.Generator, name: str, vocabulary: Domain, share: float) -> str:
     found = ""
     for attribute, default in vocabulary.default_states(name).items():
         if attribute in ("sliced", "broken"):
@@ -186,7 +187,7 @@ def geometric(episode: Episode, state: State, step: Subtask) -> bool:
 
 def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> list[Episode]:
     """Episodes that cover what they can in a time, and kill what they can of some mutants."""
-    rng, vocabulary, end = np.random.default_rng(seed), household(), time.monotonic() + seconds
+    rng, vocabulary, end = np.random.default_rng(seed), shipped("household"), time.monotonic() + seconds
     coverage, corpus = Coverage(domain), load_corpus() if CORPUS.exists() else []
     for episode in corpus:
         _, left = _worth([*play(episode, domain, coverage)], left)

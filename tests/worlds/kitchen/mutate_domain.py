@@ -26,7 +26,7 @@ from mutants import Mutant, kills, mutants
 
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 
 def played(domain: Domain) -> list[list[Step]]:
@@ -41,7 +41,7 @@ def survivors(several: Iterable[Mutant], episodes: Sequence[Sequence[Step]]) -> 
 
 def main() -> int:
     """Print the survivors."""
-    domain, catalogue = shipped("household"), household()
+    domain, catalogue = shipped("household"), shipped("household")
     rules, facts = list(mutants(domain)), list(lacking(domain))
     alive = survivors(rules, played(domain))
     alive += [str(m) for m in facts if not any(True for _ in differences(m.domain, catalogue))]

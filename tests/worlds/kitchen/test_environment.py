@@ -8,7 +8,7 @@ from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import shipped
+from forestall.domain.load import extend, shipped
 from forestall.worlds.kitchen.environment import SCAN_FRAMES, KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
@@ -91,16 +91,9 @@ def test_a_running_device_works_from_the_start():
 
 
 def test_a_new_category_from_a_task_file_follows_the_same_rules():
-    teapot = parse_category(
-        "Teapot",
-        {
-            "pickupable": True,
-            "attributes": ["filled", "dirty"],
-            "words": "teapot",
-        },
-    )
-    vocabulary = shipped("household").extended({"Teapot": teapot})
-    env = flat_environment(SceneNeeds(objects=(ObjectNeed("Teapot-1", "Teapot"),)), vocabulary)
+    teapot = {"tags": ["pickupable"], "attributes": ["filled", "dirty"], "words": "teapot"}
+    domain = extend(shipped("household"), {"Teapot": teapot}, {})
+    env = flat_environment(SceneNeeds(objects=(ObjectNeed("Teapot-1", "Teapot"),)), domain)
     env.reset(0)
     for step in ("pick_up(Teapot)", "put_in(Teapot, Sink)", "toggle_on(Faucet)"):
         assert env.execute(Subtask.parse(step)).status is SkillStatus.SUCCEEDED
