@@ -1,7 +1,7 @@
 """No engine package holds a name of a shipped domain: no verb, category, attribute, value, tag.
 
-Names that geometry itself uses (inside, on top of, left of, ...) are perception's own words, so that
-relations count only outside of it. Checked are whole strings in the code, the way a domain's name
+Names that geometry itself uses (inside, on top of, left of, ...) are perception's own words, so
+that relations count only outside of it. Checked are whole strings in the code, the way a domain's name
 would be used; a docstring may explain itself with a mug.
 """
 
@@ -21,8 +21,8 @@ PLUGINS = ("domains", "worlds", "testing", "training", "cli")
 """Plug-ins, the training of the household's encoder, and the examples of the command line."""
 
 PLAIN = {
-    "open", "on", "off", "closed", "empty", "room", "inside", "whole", "near", "raw", "place", "clean",
-    "above", "below", "behind", "insert", "broken", "in_front_of",
+    "open", "on", "off", "closed", "empty", "room", "inside", "whole", "near", "raw", "place",
+    "clean", "above", "below", "behind", "insert", "broken", "in_front_of",
 }  # fmt: skip
 """Words of English, of JSON keys and of file modes that a domain happens to use, too."""
 

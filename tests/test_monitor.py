@@ -373,7 +373,7 @@ def test_the_real_strategy_on_graphs_of_the_callers_own() -> None:
     kitchen = flat_environment(needs, loaded.domain)
     kitchen.reset(3)
     monitor = Monitor(
-        make_strategy(RunConfig("heat-potato", seed=3), loaded.domain, memory()),
+        make_strategy(run_config("heat-potato", seed=3), loaded.domain, memory()),
         loaded.domain,
         config=MonitorConfig(on_alarm="proceed"),
         scope=lambda graph, subtask: scope(graph, subtask, loaded.domain, ScopeConfig()),

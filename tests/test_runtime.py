@@ -44,9 +44,9 @@ ON_FLAT_WORLDS = sorted(set(scenario_names("examples")) - {"knife-blocked"})
 class TruthPerceiver:
     """Perception that is always right."""
 
-    def __init__(self, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> None:
+    def __init__(self, kitchen: KitchenEnvironment, domain: Domain) -> None:
         self._kitchen = kitchen
-        self._vocabulary = vocabulary
+        self._domain = domain
 
     def reset(self) -> None:
         pass
@@ -55,7 +55,7 @@ class TruthPerceiver:
         return self._kitchen.oracle.truth()
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
-        return scope(graph, subtask, self._vocabulary, ScopeConfig())
+        return scope(graph, subtask, self._domain, ScopeConfig())
 
     def describe(self) -> Mapping[str, str]:
         return {"segmenter": "truth", "state_estimator": "truth"}

@@ -86,7 +86,7 @@ def finished(task: str, more: tuple[ObjectNeed, ...], change: Change) -> tuple[b
     kitchen.reset(1)
     for step in change(loaded.task.plan.texts()):
         kitchen.execute(Subtask.parse(step))
-    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    strict, _, why = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
     return strict, why
 
 
@@ -119,5 +119,5 @@ def test_what_broke_on_the_way_is_not_forgotten(task: str, broken: str) -> None:
     assert kitchen.drop_held(hard=True) == f"{broken}-2"
     for subtask in loaded.task.plan:
         kitchen.execute(subtask)
-    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    strict, _, why = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
     assert not strict and any("never" in w for w in why)

@@ -28,7 +28,7 @@ def traced(task: str, scenario: str | None, seed: int = 4) -> list[TrueMoment]:
         make_strategy(run_config(task, strategy="none"), loaded.domain, None),
         loaded.domain,
         [trace],
-    ).run(loaded.task, apply_plan_faults(loaded.task.plan, faults), seed)
+    ).run(loaded.task, apply_plan_faults(loaded.task.plan, faults, loaded.domain), seed)
     return trace.moments
 
 
