@@ -1,0 +1,202 @@
+"""The planner: from an observed state and a goal to a readable plan.
+
+Called by `replanning`; calls `relevance`, `ground`, `number`, `search`, `driving`. First on what
+matters for the goal, and where that has no plan on everything; only then is something unsolvable.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from forestall.planning_new.driving import gathered, with_driving
+from forestall.planning_new.goals import (
+    Alternatives,
+    Conjunction,
+    alternatives,
+    negated,
+    shown,
+)
+from forestall.planning_new.ground import Grounding, ground
+from forestall.planning_new.grounder import Universe
+from forestall.planning_new.number import UnsupportedError, number
+from forestall.planning_new.problem import Problem
+from forestall.planning_new.relevance import everything, narrowed
+from forestall.planning_new.search import SearchConfig, SearchOutcome, solve
+from forestall.planning_new.state import State
+from forestall.types.facts import Literal
+from forestall.types.plan import Subtask
+from forestall.types.task import Goal
+from forestall.types.verdict import ReplanOutcome
+
+OUTCOMES = {
+    SearchOutcome.SOLVED: ReplanOutcome.SOLVED,
+    SearchOutcome.UNSOLVABLE: ReplanOutcome.NOT_FOUND,
+    SearchOutcome.CUT_SHORT: ReplanOutcome.NOT_FOUND,
+    SearchOutcome.TIMEOUT: ReplanOutcome.TIMEOUT,
+}
+
+_RECENT = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """What planning gave: subtasks when solved, the state after them, and what it cost."""
+
+    outcome: ReplanOutcome
+    subtasks: tuple[Subtask, ...] = ()
+    final: State | None = None
+    expanded: int = 0
+    seconds: float = 0.0
+    note: str = ""
+
+
+def plan_to(
+    state: State,
+    goals: Alternatives,
+    config: SearchConfig | None = None,
+    also: Iterable[str] = (),
+    widen: bool = True,
+) -> Planned:
+    """Plan from a state to any one of some ground conjunctions.
+
+    Args:
+        state: the first state.
+        goals: what to reach.
+        config: bounds of the search.
+        also: further things to keep in the narrowed problem.
+        widen: go on with everything where the narrowed problem has no plan.
+    """
+    start_s = time.perf_counter()
+    config = config or SearchConfig()
+    if not goals.conjunctions:
+        return Planned(ReplanOutcome.UNSOLVABLE, note="nothing that is known can meet the goal")
+    kept = narrowed(state, goals.conjunctions, also)
+    planned = Planned(ReplanOutcome.NOT_FOUND)
+    for careful in (True, False):
+        tried = _attempt(state, goals, kept, config, careful)
+        planned = replace(tried, expanded=planned.expanded + tried.expanded)
+        if planned.outcome in (ReplanOutcome.SOLVED, ReplanOutcome.UNSUPPORTED):
+            break
+        if planned.outcome is ReplanOutcome.TIMEOUT:
+            break
+    failed = planned.outcome in (ReplanOutcome.NOT_FOUND, ReplanOutcome.REJECTED)
+    if failed and widen and planned.expanded < config.max_expansions:
+        planned = _on_everything(state, goals, config, planned)
+    return replace(planned, seconds=time.perf_counter() - start_s)
+
+
+def _on_everything(
+    state: State, goals: Alternatives, config: SearchConfig, before: Planned
+) -> Planned:
+    """The search that proves something, or finds what narrowing has hidden."""
+    limits = replace(config, time_limit_s=min(config.time_limit_s, config.whole_limit_s))
+    tried = _attempt(state, goals, everything(state), limits, careful=False)
+    return replace(tried, expanded=before.expanded + tried.expanded)
+
+
+def _attempt(
+    state: State, goals: Alternatives, kept: Universe, config: SearchConfig, careful: bool
+) -> Planned:
+    start_s = time.perf_counter()
+    try:
+        problem = number(_grounding(state, kept), state, goals.conjunctions, careful)
+    except UnsupportedError as error:
+        return Planned(ReplanOutcome.UNSUPPORTED, note=str(error))
+    found = solve(problem, config)
+    outcome = OUTCOMES[found.outcome]
+    subtasks: tuple[Subtask, ...] = ()
+    final, note = None, ""
+    if outcome is ReplanOutcome.SOLVED:
+        loose = frozenset(x for x in kept.supports if x not in goals.names)
+        steps = gathered(problem, state, [problem.operators[i] for i in found.steps])
+        subtasks, final, note = with_driving(state, steps, loose)
+        if final is None:
+            outcome = ReplanOutcome.REJECTED
+    elif found.outcome is SearchOutcome.UNSOLVABLE:
+        whole = kept.purposeful is None and goals.complete and not problem.bounded and not careful
+        outcome = ReplanOutcome.UNSOLVABLE if whole else ReplanOutcome.NOT_FOUND
+        note = _why_not(state, goals.conjunctions)
+    else:
+        note = f"no plan within the limits ({found.expanded} states expanded)"
+    return Planned(outcome, subtasks, final, found.expanded, time.perf_counter() - start_s, note)
+
+
+def plan_goal(state: State, goal: Goal, config: SearchConfig | None = None) -> Planned:
+    """Plan from a state to a task's goal, whatever binding of its variables is nearest."""
+    goals = alternatives(state, goal)
+    if not goals.conjunctions:
+        missing = [c for _, c in goal.variables if not _anywhere(state, c)]
+        missing += [a for x in goal.literals for a in x.args if _nowhere(state, a)]
+        names = ", ".join(dict.fromkeys(missing)) or "what the goal asks for"
+        return Planned(ReplanOutcome.UNSOLVABLE, note=f"{names}: its place is not known")
+    planned = plan_to(state, goals, config, widen=False)
+    if planned.outcome in (ReplanOutcome.NOT_FOUND, ReplanOutcome.REJECTED):
+        bounds = config or SearchConfig()
+        if planned.expanded < bounds.max_expansions:
+            goals = alternatives(state, goal, whole=True)
+            return _on_everything(state, goals, bounds, planned)
+    return planned
+
+
+def pose(
+    state: State, goals: Alternatives, also: Iterable[str] = (), whole: bool = False
+) -> Problem:
+    """The ground problem of a state and goal alternatives.
+
+    Raises:
+        UnsupportedError: no alternative can be expressed.
+    """
+    kept = everything(state) if whole else narrowed(state, goals.conjunctions, also)
+    return number(_grounding(state, kept), state, goals.conjunctions, not whole)
+
+
+_groundings: OrderedDict[tuple[object, ...], Grounding] = OrderedDict()
+
+
+def _grounding(state: State, kept: Universe) -> Grounding:
+    """What can happen among the kept things; the several searches of one replanning share it."""
+    known = frozenset(kept.things)
+    hands = state.domain.robot.hands
+    facts = frozenset(f for f in state.facts if all(a in known or a in hands for a in f[1:]))
+    key = (
+        id(state.domain),
+        tuple((x, state.kinds[x]) for x in kept.things),
+        tuple(sorted(state.kinds.items())),
+        facts,
+        state.lost,
+        tuple(sorted(kept.made.items())),
+        kept.purposeful,
+        kept.supports,
+    )
+    found = _groundings.get(key)
+    if found is None:
+        found = _groundings[key] = ground(state, kept)
+        if len(_groundings) > _RECENT:
+            _groundings.popitem(last=False)
+    return found
+
+
+def _anywhere(state: State, category: str) -> bool:
+    return any(x not in state.lost for x in state.matches(category))
+
+
+def _nowhere(state: State, name: str) -> bool:
+    hands = state.domain.robot.hands
+    return name not in hands and not name.startswith("?") and not _anywhere(state, name)
+
+
+def _why_not(state: State, goals: Sequence[Conjunction]) -> str:
+    """A reason for a dead end, naming what is lost if something is."""
+    names = Alternatives(tuple(goals)).names
+    lost = sorted(names & state.lost)
+    if lost:
+        return f"{', '.join(lost)}: its place is not known"
+    facts: list[Literal | str] = [
+        x for x in goals[0] if isinstance(x, Literal) and negated(x) is None and not state.holds(x)
+    ]
+    return "no sequence of skills leads to " + ", ".join(
+        map(str, facts or [shown(x) for x in goals[0]])
+    )

@@ -1,0 +1,135 @@
+"""The validator: executes any plan, whoever made it, on an observed scene graph.
+
+Called by replanners, strategies and tests; calls `domain`. It names the first step that cannot run
+and why, and then the goal facts that the plan leaves unmet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice, product
+
+from forestall.planning.domain import Refusal, apply, resolve
+from forestall.planning.effects import settle
+from forestall.planning.state import SUPPORTED, State
+from forestall.types.facts import Literal
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Plan, Subtask
+from forestall.types.task import Goal
+from forestall.types.verdict import PlanCheck
+from forestall.vocabulary import Vocabulary
+
+MAX_BINDINGS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What executing subtasks gave: every state, and where it stopped, if it did."""
+
+    states: tuple[State, ...]
+    step: int | None = None
+    refusal: Refusal | None = None
+    touched: frozenset[str] = frozenset()
+
+    @property
+    def final(self) -> State:
+        """The last state that was reached."""
+        return self.states[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class GraphValidator:
+    """Implements `PlanValidator` over the symbolic domain."""
+
+    vocabulary: Vocabulary
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        """Execute the plan on the observed graph, then check the goal and what never may happen."""
+        trace = run(observed(graph, self.vocabulary), plan.subtasks)
+        assumed = _relied_on(trace, goal)
+        if trace.refusal is not None:
+            return PlanCheck(
+                False, trace.step, trace.refusal.reason, trace.refusal.lacking, (), assumed
+            )
+        missing = unmet(trace.states, goal)
+        reason = ""
+        if missing:
+            reason = "the plan runs, but its goal is not met: " + ", ".join(map(str, missing))
+        return PlanCheck(not missing, None, reason, (), missing, assumed)
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptAll:
+    """Accepts every plan unseen (implements `PlanValidator`): the ablation without validation."""
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        """Say yes."""
+        return PlanCheck(True)
+
+
+def observed(graph: SceneGraph, vocabulary: Vocabulary) -> State:
+    """The state of a graph, after what the running devices have done by now."""
+    state = State.from_graph(graph, vocabulary)
+    settle(state)
+    return state
+
+
+def run(state: State, subtasks: Iterable[Subtask]) -> Trace:
+    """Execute subtasks one after the other until one is refused."""
+    states: list[State] = [state]
+    touched: set[str] = set()
+    for step, subtask in enumerate(subtasks):
+        after = apply(states[-1], subtask)
+        if isinstance(after, Refusal):
+            return Trace(tuple(states), step, after, frozenset(touched))
+        meant = resolve(states[-1].copy(), subtask)
+        if not isinstance(meant, Refusal):
+            for name in meant:
+                touched.update((name, *(p.parent for p in states[-1].chain(name))))
+        states.append(after)
+    return Trace(tuple(states), None, None, frozenset(touched))
+
+
+def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
+    """Goal literals that fail under the best binding of the goal's variables; () if it is met.
+
+    A literal of `never` that held at any time is returned as it stands, bound.
+    """
+    final = states[-1]
+    best: tuple[Literal, ...] | None = None
+    for binding in bindings(final, goal):
+        missing = tuple(g for x in goal.literals if not final.holds(g := x.bind(binding)))
+        never = tuple(g for x in goal.never if any(s.holds(g := x.bind(binding)) for s in states))
+        if not missing and not never:
+            return ()
+        if best is None or len(missing) + len(never) < len(best):
+            best = missing + never
+    if best is not None:
+        return best
+    return tuple(Literal("located", (c,)) for _, c in goal.variables if not final.matches(c))
+
+
+def bindings(state: State, goal: Goal) -> Iterator[dict[str, str]]:
+    """Every binding of the goal's variables to different things (bounded), in a fixed order."""
+    names = [v for v, _ in goal.variables]
+    choices = [state.matches(c) for _, c in goal.variables]
+    for values in islice(product(*choices), MAX_BINDINGS):
+        if len(set(values)) == len(values):
+            yield dict(zip(names, values, strict=True))
+
+
+def unsupported(literals: Iterable[Literal], vocabulary: Vocabulary) -> tuple[Literal, ...]:
+    """Literals that no symbolic state can decide (geometry, unknown predicates)."""
+    known = {*SUPPORTED, *vocabulary.attributes}
+    return tuple(x for x in literals if x.predicate not in known)
+
+
+def _relied_on(trace: Trace, goal: Goal) -> tuple[Literal, ...]:
+    """Assumed facts about what the plan handles or the goal asks for."""
+    final = trace.final
+    wanted = {m for x in goal.literals for a in x.args for m in final.matches(a)}
+    wanted |= {m for _, c in goal.variables for m in final.matches(c) if len(final.matches(c)) == 1}
+    concerned = trace.touched | wanted
+    facts = {f for s in (trace.states[0], final) for f in s.assumed}
+    return tuple(sorted(f for f in facts if f.args and f.args[0] in concerned))
