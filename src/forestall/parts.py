@@ -20,6 +20,7 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
+from forestall.domain.load import domain_of
 from forestall.planning.validate import AcceptAll, GraphValidator
 from forestall.registry import known, load
 from forestall.replanning.symbolic import PlannerReplanner
@@ -147,7 +148,7 @@ def make_strategy(
         make_detector(config, vocabulary),
         make_reasoner(config, vocabulary),
         make_replanner(config, vocabulary),
-        GraphValidator(vocabulary),
+        GraphValidator(domain_of(vocabulary)),
     ]
     if config.strategy in ("online", "online-scene"):
         parts.append(partial(scope, vocabulary=vocabulary, config=ScopeConfig()))
@@ -159,7 +160,7 @@ def make_reasoner(config: RunConfig, vocabulary: Vocabulary) -> Reasoner:
     if config.without == "reasoning":
         from forestall.diagnosis.none import NoReasoning
 
-        return NoReasoning(vocabulary)
+        return NoReasoning(domain_of(vocabulary))
     return SymbolicReasoner(mine, violations, vocabulary)
 
 
@@ -168,14 +169,15 @@ def make_replanner(config: RunConfig, vocabulary: Vocabulary) -> Replanner:
 
     Where validation is left out, the first plan that is found is taken unchecked.
     """
-    validator: PlanValidator = GraphValidator(vocabulary)
+    domain = domain_of(vocabulary)
+    validator: PlanValidator = GraphValidator(domain)
     if config.without == "validation":
         validator = AcceptAll()
     if config.without == "reasoning":
         from forestall.replanning.anew import GoalReplanner
 
-        return GoalReplanner(validator, vocabulary)
-    return PlannerReplanner(validator, vocabulary)
+        return GoalReplanner(validator, domain)
+    return PlannerReplanner(validator, domain)
 
 
 def make_detector(config: RunConfig, vocabulary: Vocabulary) -> Detector:

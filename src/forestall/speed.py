@@ -17,6 +17,7 @@ from typing import Any
 from forestall.build import STATES, RunConfig, prepare, run_episode
 from forestall.comparison.timing import score_times
 from forestall.demonstrations import ready_made
+from forestall.domain.load import domain_of
 from forestall.memory.store import open_store
 from forestall.parts import make_state_estimator
 from forestall.perception.perceiver import GraphPerceiver
@@ -107,7 +108,8 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
 
 def _plans(context: BoundaryContext, vocabulary: Any, repeat: int) -> list[float]:
     wanted = (Literal("open", ("Microwave-1",), "open"), Literal("held_by", ("Plate-1", "gripper")))
-    replanner = PlannerReplanner(GraphValidator(vocabulary), vocabulary)
+    domain = domain_of(vocabulary)
+    replanner = PlannerReplanner(GraphValidator(domain), domain)
     times = []
     for _ in range(repeat):
         started = time.perf_counter()

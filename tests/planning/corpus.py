@@ -7,6 +7,7 @@ separated by commas: `Mug-1 on CounterTop-1`, `Egg-1 in Fridge-1`, `Pot-1 blocks
 
 from __future__ import annotations
 
+from forestall.domain.load import shipped
 from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Plan
@@ -14,6 +15,7 @@ from forestall.types.task import Goal
 from forestall.vocabulary import ATTRIBUTES, household
 
 VOCABULARY = household()
+DOMAIN = shipped("household")
 _PREDICATES = {"on": "on_top_of", "in": "inside", "blocks": "blocking"}
 _BOX = Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 

@@ -10,27 +10,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from forestall.domain.model import Domain
 from forestall.planning.validate import observed, unmet
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, Verdict
-from forestall.vocabulary import Vocabulary
 
 
 class NoReasoning:
     """Names what the goal still lacks in place of a cause (implements `Reasoner`).
 
     Args:
-        vocabulary: the categories.
+        domain: what is planned in.
     """
 
     name = "none"
 
-    def __init__(self, vocabulary: Vocabulary) -> None:
-        self._vocabulary = vocabulary
+    def __init__(self, domain: Domain) -> None:
+        self._domain = domain
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         """The goal's literals that do not hold under the binding that comes nearest to it."""
-        state = observed(context.graph, self._vocabulary)
+        state = observed(context.graph, self._domain)
         lacking = unmet((state,), replace(context.task.goal, never=()))
         return Diagnosis(
             cause="no reasoning: the scene does not fit",

@@ -51,6 +51,11 @@ def shipped(name: str) -> Domain:
     return read_domain(place.read_text(encoding="utf-8"), f"domains/{name}/domain.toml")
 
 
+def domain_of(vocabulary: object) -> Domain:
+    """The domain of tasks that still come with a vocabulary."""
+    return shipped("household")
+
+
 def shipped_names() -> tuple[str, ...]:
     """Names of the domains that come with the project."""
     folder = files("forestall").joinpath("domains")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from forestall.domain.load import domain_of
 from forestall.planning.validate import GraphValidator
 from forestall.seams import OracleView
 from forestall.strategies.intervention import rest_of
@@ -42,7 +43,7 @@ class TruthTrace:
 
     def attach(self, oracle: OracleView, vocabulary: Vocabulary) -> None:
         """Say whose truth is meant; `build` does."""
-        validator = GraphValidator(vocabulary)
+        validator = GraphValidator(domain_of(vocabulary))
 
         def look(context: BoundaryContext) -> TrueMoment:
             truth = oracle.truth()

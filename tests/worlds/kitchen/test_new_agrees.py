@@ -5,8 +5,8 @@ import pytest
 from small_kitchen import SmallKitchen
 
 from forestall.domain.load import shipped
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER
 from forestall.types.plan import SKILLS, Subtask

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 from forestall.domain.evaluate import static_holds
 from forestall.domain.model import Domain, PredicateKind
-from forestall.planning_new.nodes import Junction, Node, all_of, assuming
-from forestall.planning_new.problem import Atom
-from forestall.planning_new.schemas import Schemas
-from forestall.planning_new.state import State
+from forestall.planning.nodes import Junction, Node, all_of, assuming
+from forestall.planning.problem import Atom
+from forestall.planning.schemas import Schemas
+from forestall.planning.state import State
 from forestall.types.facts import category_of
 
 EXISTS = "exists"

@@ -12,10 +12,10 @@ from dataclasses import replace
 from forestall.domain.formula import And, Formula
 from forestall.domain.model import PredicateKind
 from forestall.errors import InputError
-from forestall.planning_new.ground import Change, Draft, Event, Grounding
-from forestall.planning_new.nodes import Junction, Node, facts_of
-from forestall.planning_new.problem import Atom, Effect, Happening, Operator, Problem, Rule, Stratum
-from forestall.planning_new.state import State, decided
+from forestall.planning.ground import Change, Draft, Event, Grounding
+from forestall.planning.nodes import Junction, Node, facts_of
+from forestall.planning.problem import Atom, Effect, Happening, Operator, Problem, Rule, Stratum
+from forestall.planning.state import State, decided
 from forestall.types.facts import Literal
 
 Goal = tuple[Formula, ...]

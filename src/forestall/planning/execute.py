@@ -14,8 +14,8 @@ from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
 from forestall.domain.formula import Every, Fewer, Formula, Not, Or, Some, bind, free, normal
 from forestall.domain.model import LOCATED, Choice, Effect, Need, Skill
 from forestall.errors import InputError
-from forestall.planning_new.settle import change, settle
-from forestall.planning_new.state import State
+from forestall.planning.settle import change, settle
+from forestall.planning.state import State
 from forestall.types.facts import Literal, is_instance
 from forestall.types.plan import Subtask
 

@@ -22,7 +22,7 @@ from forestall.domain.formula import (
     normal,
 )
 from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain, PredicateKind
-from forestall.planning_new.nodes import Node, all_of, any_of, at_least, negate
+from forestall.planning.nodes import Node, all_of, any_of, at_least, negate
 from forestall.types.facts import Literal
 
 Names = Mapping[str, str]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from forestall.domain.formula import Formula, Not, literals
-from forestall.planning_new.state import State, by_number
+from forestall.planning.state import State, by_number
 from forestall.types.facts import Literal, category_of, is_instance
 from forestall.types.task import Goal
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import And, Formula, Not, Some, free, literals, normal
 from forestall.domain.model import FACING, Choice, Domain, Effect, PredicateKind, Skill
-from forestall.planning_new.execute import mentions
-from forestall.planning_new.grounder import EXISTS, Grounder, Universe
-from forestall.planning_new.nodes import Junction, Node, all_of, any_of, negate
-from forestall.planning_new.schemas import Schemas
-from forestall.planning_new.state import State
+from forestall.planning.execute import mentions
+from forestall.planning.grounder import EXISTS, Grounder, Universe
+from forestall.planning.nodes import Junction, Node, all_of, any_of, negate
+from forestall.planning.schemas import Schemas
+from forestall.planning.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 

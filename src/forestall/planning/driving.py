@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.problem import Operator, Problem
-from forestall.planning_new.state import State, by_number
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.problem import Operator, Problem
+from forestall.planning.state import State, by_number
 from forestall.types.facts import category_of
 from forestall.types.plan import Subtask
 
