@@ -15,6 +15,7 @@ from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import IMAGE_ENCODER, STATES
 from forestall.training import shards
+from forestall.training.questions import ATTRIBUTES
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.plan import Subtask
@@ -95,4 +96,6 @@ def test_a_memory_without_looks_is_refused_for_the_feature_image() -> None:
     step = DemonstrationStep(0, subtask, graph, graph)
     config = run_config("heat-potato", feature="image")
     with pytest.raises(InputError, match=r"node features of demonstration .* come from nothing"):
-        make_strategy(config, shipped("household"), [Demonstration("heat-potato", "kitchen-1", 1, (step,))])
+        make_strategy(
+            config, shipped("household"), [Demonstration("heat-potato", "kitchen-1", 1, (step,))]
+        )

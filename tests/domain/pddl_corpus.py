@@ -7,9 +7,9 @@ from pathlib import Path
 
 from forestall.domain.formula import Formula
 from forestall.domain.load import load_domain
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.pddl_problem import read_problem
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.pddl_problem import read_problem
+from forestall.planning.state import State
 from forestall.types.plan import Subtask
 
 FOLDER = Path(__file__).parent / "pddl"

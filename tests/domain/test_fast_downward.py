@@ -13,8 +13,8 @@ from pddl_corpus import FOLDER, NAMES, execute, problem, read_plan, subtask
 from forestall.domain.formula import parse_formula
 from forestall.domain.load import shipped
 from forestall.domain.pddl_out import domain_pddl, problem_pddl
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("up_fast_downward") is None, reason="Fast Downward is not installed"

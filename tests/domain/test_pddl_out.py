@@ -9,7 +9,7 @@ from forestall.domain.load import load_domain, shipped
 from forestall.domain.pddl_in import read_pddl
 from forestall.domain.pddl_out import domain_pddl, problem_pddl
 from forestall.errors import DomainError
-from forestall.planning_new.pddl_problem import read_problem
+from forestall.planning.pddl_problem import read_problem
 
 PLAIN = [n for n in NAMES if n not in ("coffee", "either", "lamps")]
 """Without what PDDL cannot say or planners do not read: annotations, unions of types."""

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import PerceptionError
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
@@ -18,7 +19,6 @@ from forestall.types.feature import quantised
 from forestall.types.graph import Seen
 from forestall.types.observation import Frame, Mask, Rgb
 from forestall.types.plan import Subtask
-from forestall.domain.load import shipped
 
 from .synthetic import Solid, at, looking, observed
 

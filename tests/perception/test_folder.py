@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from forestall.domain.load import shipped
 from forestall.errors import FileFormatError, PerceptionError, UnknownNameError
 from forestall.perception.folder import read_observation, write_observation
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
 from forestall.types.observation import Frame, Observation
-from forestall.domain.load import shipped
 
 from .synthetic import Solid, at, looking, observed
 

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import InputError
 from forestall.perception.learned import LearnedStateEstimator
 from forestall.types.encoder import StateReading
 from forestall.types.observation import Detection, Frame, Intrinsics
-from forestall.domain.load import shipped
 
 
 class ColourEncoder:

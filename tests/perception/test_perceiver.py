@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 from forestall.errors import PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.geometry import Stack, Thing
@@ -23,8 +25,6 @@ from forestall.seams import Perceiver, Segmenter, StateEstimator
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
-from forestall.domain.load import shipped
-from forestall.domain.model import Domain
 
 from .synthetic import Solid, at, looking, observed
 
@@ -177,7 +177,9 @@ def test_moving_the_world_moves_the_graph() -> None:
     pose[:3, 3] += shift
     graphs = []
     for solids, camera in ((SCENE, EYE), ([s.moved(shift) for s in SCENE], pose)):
-        perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), shipped("household"))
+        perceiver = GraphPerceiver(
+            InstanceSegmenter(), GivenStateEstimator({}), shipped("household")
+        )
         graphs.append(perceiver.perceive(observed(solids, camera)))
     assert graphs[0].relations == graphs[1].relations
 
@@ -210,7 +212,9 @@ def test_the_oracle_tells_only_what_a_camera_could() -> None:
     by_name = dict(zip([d.instance for d in found], near, strict=True))
     assert by_name["Mug-1"] == {"filled": "coffee", "dirty": "dirty"}
     assert set(asked) == {"CounterTop-1", "Mug-1"}
-    far = OracleStateEstimator(states, shipped("household"), fine_pixels=10**6).estimate(frame, found)
+    far = OracleStateEstimator(states, shipped("household"), fine_pixels=10**6).estimate(
+        frame, found
+    )
     by_name = dict(zip([d.instance for d in found], far, strict=True))
     assert by_name["Mug-1"] == {"filled": None, "dirty": None}
     unnamed = [Detection("Mug", found[0].mask)]

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
@@ -13,7 +14,6 @@ from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Intrinsics, Observation
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 pytestmark = pytest.mark.simulator

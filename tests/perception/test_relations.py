@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.types.graph import SceneGraph
-from forestall.domain.load import shipped
 
 from .synthetic import Solid, at, hollow, looking, observed
 
@@ -18,7 +18,9 @@ MUG = (0.085, 0.085, 0.10)
 
 
 def graph_of(solids, *poses, states=None, holding=None, hand=(0.0, -0.5, 1.2)) -> SceneGraph:
-    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator(states or {}), shipped("household"))
+    perceiver = GraphPerceiver(
+        InstanceSegmenter(), GivenStateEstimator(states or {}), shipped("household")
+    )
     return perceiver.perceive(observed(solids, *(poses or (EYE,)), holding=holding, hand=hand))
 
 

@@ -1,12 +1,12 @@
 import pytest
 from pydantic import BaseModel, ValidationError
 
+from forestall.domain.load import shipped
 from forestall.errors import InputError, UnknownNameError
 from forestall.tasks import faults as f
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.flat_world import flat_environment
 
 DOMAIN = shipped("household")

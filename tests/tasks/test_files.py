@@ -59,9 +59,10 @@ places = ["CounterTop"]
 
 [categories.Ladle]
 words = "ladle"
-pickupable = true
+tags = ["pickupable"]
 attributes = ["dirty"]
-shape = { kind = "box", size_m = [0.28, 0.06, 0.04] }
+size_m = [0.28, 0.06, 0.04]
+world = { shape = { kind = "box" } }
 """
 
 
@@ -169,7 +170,7 @@ def test_a_task_with_an_attribute_of_its_own(tmp_path: Path) -> None:
     words = loaded.domain
     assert words["Tomato"].attributes == ("sliced", "temperature", "ripe")
     assert words["Tomato"].synonyms[-1] == "love apple"
-    assert words["Tomato"].slices_into == "TomatoSliced"
+    assert words.static("slices_into", "Tomato", "TomatoSliced")
     assert words.phrases("Tomato", "ripe", "ripe") == ("a red tomato",)
     assert words.phrases("Fridge", "open", "open") == ("a fridge ajar",)
     assert loaded.task.scene.objects[0].states == (("ripe", "ripe"),)

@@ -6,11 +6,11 @@ from collections import Counter
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults
 from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
 from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 
 pytestmark = pytest.mark.simulator

@@ -57,7 +57,9 @@ class Run:
         return irreversible(self.loaded.task.goal, self.kitchen.oracle, self.loaded.domain)
 
     def checked(self) -> tuple[bool, bool | None, tuple[str, ...]]:
-        return TruthGoalChecker(self.loaded.domain).check(self.loaded.task.goal, self.kitchen.oracle)
+        return TruthGoalChecker(self.loaded.domain).check(
+            self.loaded.task.goal, self.kitchen.oracle
+        )
 
     def planned(self) -> Planned:
         truth = observed(self.kitchen.oracle.truth(), self.loaded.domain)

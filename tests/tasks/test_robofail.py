@@ -4,6 +4,7 @@ from collections import Counter
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.faults import (
     apply_plan_faults,
     apply_scene_faults,
@@ -16,7 +17,6 @@ from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 

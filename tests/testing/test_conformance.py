@@ -5,7 +5,6 @@ from forestall.testing.conformance import check_environment
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.flat_world import flat_environment
 
 HOUSEHOLD = shipped("household")

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.embeddings.crops import INPUT_PIXELS
 from forestall.embeddings.twotower import DESCRIPTION_NAME, TwoTowerEncoder
 from forestall.errors import FileFormatError, InputError
 from forestall.training import shards
 from forestall.training.examine import answers, vectors
 from forestall.training.measure import measure
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.recipe import Recipe, train
-from forestall.domain.load import shipped
 
 COLOURS = {("Fridge", 0): (200, 30, 30), ("Fridge", 1): (30, 30, 200), ("Apple", 0): (30, 200, 30)}
 """Category and whether it is open → the colour in which the test paints it."""

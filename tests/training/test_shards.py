@@ -3,11 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.training import shards
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, SceneConfig
 from forestall.training.shards import PictureConfig, make_shard, read
-from forestall.domain.load import shipped
 
 SMALL = PictureConfig(1, 1, 1, 1, SceneConfig(views=2, things=(6, 8)), "embree")
 
@@ -46,7 +47,9 @@ def test_the_same_seed_draws_the_same_pictures(folder: Path) -> None:
 
 
 def test_nothing_else_is_true_of_what_is_broken() -> None:
-    artist = Artist(shipped("household"), SceneConfig(views=1, things=(12, 14), broken=1.0), "embree")
+    artist = Artist(
+        shipped("household"), SceneConfig(views=1, things=(12, 14), broken=1.0), "embree"
+    )
     (picture,) = artist.pictures(77)
     broken = [s for s in picture.states.values() if s.get("broken") == "broken"]
     assert broken and all(s == {"broken": "broken"} for s in broken)

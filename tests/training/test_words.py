@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.embeddings.tokens import words
 from forestall.errors import FileFormatError, UnknownNameError
 from forestall.training.words import GROUPS, Word, accuracy, nearest, word_list
-from forestall.domain.load import shipped
 
 LIST = word_list()
 

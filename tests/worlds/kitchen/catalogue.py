@@ -14,7 +14,7 @@ from typing import Any
 from mutants import Mutant
 
 from forestall.domain.model import Domain
-from forestall.vocabulary import Category, Receptacle, Domain
+from forestall.vocabulary import Category, Domain, Receptacle
 from forestall.worlds.kitchen.skills import KNIFE
 
 

@@ -22,9 +22,9 @@ from forestall.domain.evaluate import TRUE as HOLDS
 from forestall.domain.evaluate import evaluate, literal_truth, solutions
 from forestall.domain.formula import And, Formula, Or, literals, normal, show
 from forestall.domain.model import SAME, Choice, Domain, Effect, Need, PredicateKind, Skill
-from forestall.planning_new import execute, settle
-from forestall.planning_new.execute import Refusal
-from forestall.planning_new.state import State
+from forestall.planning import execute, settle
+from forestall.planning.execute import Refusal
+from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER, Literal
 from forestall.types.plan import Subtask
@@ -72,7 +72,9 @@ class Step:
         """What the kitchen and the domain do not agree on."""
         if isinstance(self.after, Refusal) != self.refused:
             said = self.after.reason if isinstance(self.after, Refusal) else "succeeds"
-            return [f"{self.subtask}: the domain {said!r}, the kitchen {self.reason or 'succeeds'!r}"]
+            return [
+                f"{self.subtask}: the domain {said!r}, the kitchen {self.reason or 'succeeds'!r}"
+            ]
         known = belief(self.before if isinstance(self.after, Refusal) else self.after)
         return [
             f"{self.subtask}: {key} is {self.truth.get(key)!r}, believed {known.get(key)!r}"
@@ -365,9 +367,7 @@ class Coverage:
             self._only_by(
                 label, effect.variables, original.condition, effect.condition, state, names
             )
-        self._missing(
-            label, effect.variables, original.condition, state, names, effect.condition
-        )
+        self._missing(label, effect.variables, original.condition, state, names, effect.condition)
 
     def _missing(
         self,

@@ -27,12 +27,10 @@ from forestall.domain.evaluate import TRUE, evaluate
 from forestall.domain.formula import free
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain, Skill
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
-from forestall.domain.load import shipped
-from forestall.domain.model import Domain
 
 THINGS = (
     "Mug-1", "Mug-2", "Cup-1", "Bowl-1", "Bowl-2", "Plate-1", "Plate-2", "Pot-1", "Pan-1", "Kettle-1",
@@ -187,7 +185,11 @@ def geometric(episode: Episode, state: State, step: Subtask) -> bool:
 
 def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> list[Episode]:
     """Episodes that cover what they can in a time, and kill what they can of some mutants."""
-    rng, vocabulary, end = np.random.default_rng(seed), shipped("household"), time.monotonic() + seconds
+    rng, vocabulary, end = (
+        np.random.default_rng(seed),
+        shipped("household"),
+        time.monotonic() + seconds,
+    )
     coverage, corpus = Coverage(domain), load_corpus() if CORPUS.exists() else []
     for episode in corpus:
         _, left = _worth([*play(episode, domain, coverage)], left)

@@ -26,9 +26,9 @@ from forestall.domain.formula import (
 )
 from forestall.domain.model import Choice, Domain, Effect, Make, Process, Skill
 from forestall.errors import ForestallError
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.settle import settle
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.settle import settle
+from forestall.planning.state import State
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from mutants import Mutant, kills, mutants
 
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
-from forestall.domain.load import shipped
 
 
 def played(domain: Domain) -> list[list[Step]]:

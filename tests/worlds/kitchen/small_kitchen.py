@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 
+from forestall.domain.load import shipped
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import category_of
 from forestall.types.observation import Intrinsics
 from forestall.types.plan import Subtask
 from forestall.types.scene import SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.effects import EffectConfig
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatRenderer, FlatScene, FlatWorld

@@ -17,7 +17,6 @@ from mutants import mutants
 from mutate_domain import survivors
 
 from forestall.domain.load import shipped
-from forestall.domain.load import shipped
 
 DOMAIN = shipped("household")
 
@@ -85,6 +84,9 @@ def test_categories_are_those_of_the_kitchen():
 
 
 def test_no_tag_attribute_default_number_or_static_fact_can_be_left_out():
-    told = {str(m): any(True for _ in differences(m.domain, shipped("household"))) for m in lacking(DOMAIN)}
+    told = {
+        str(m): any(True for _ in differences(m.domain, shipped("household")))
+        for m in lacking(DOMAIN)
+    }
     assert len(told) > 400
     assert [name for name, noticed in told.items() if not noticed] == []

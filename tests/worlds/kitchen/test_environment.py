@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from small_kitchen import SmallKitchen
 
+from forestall.domain.load import extend, shipped
 from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import extend, shipped
 from forestall.worlds.kitchen.environment import SCAN_FRAMES, KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 

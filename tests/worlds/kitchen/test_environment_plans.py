@@ -2,12 +2,12 @@
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.tasks.files import load_scenario, load_task, scenario_names
 from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
@@ -177,9 +177,7 @@ CORRECTED = {
 def test_a_scenario_can_be_overcome(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    env = flat_environment(
-        apply_scene_faults(task.scene, scenario.faults, DOMAIN), DOMAIN
-    )
+    env = flat_environment(apply_scene_faults(task.scene, scenario.faults, DOMAIN), DOMAIN)
     assert _run(env, Plan.parse(CORRECTED[name].split()), 2) == []
     assert TruthGoalChecker(DOMAIN).check(task.goal, env.oracle)[0]
 

@@ -10,7 +10,6 @@ from forestall.types.episode import SkillStatus
 from forestall.types.observation import Intrinsics
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.environment import SCAN_FRAMES, KitchenEnvironment
 
 SMALL = Intrinsics.from_vertical_fov(96, 72, 60.0)

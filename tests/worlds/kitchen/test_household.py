@@ -4,12 +4,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_kitchen import CONTAINING, SmallKitchen
 
+from forestall.domain.load import shipped
+from forestall.domain.truth import truth as truth_of
 from forestall.errors import UnknownNameError
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-from forestall.domain.load import shipped
-from forestall.domain.truth import truth as truth_of
 from forestall.worlds.kitchen.catalogue import shipped_catalogue
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatScene, FlatWorld
 from forestall.worlds.kitchen.household import Household, natural_key
@@ -125,7 +125,9 @@ def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed):
     clock = 0.0
     for _ in range(40):
         verb = verbs[int(rng.integers(len(verbs)))]
-        args = tuple(THINGS[int(k)] for k in rng.integers(len(THINGS), size=len(skills[verb].roles)))
+        args = tuple(
+            THINGS[int(k)] for k in rng.integers(len(THINGS), size=len(skills[verb].roles))
+        )
         kitchen.env.execute(Subtask(verb, args))
         if rng.random() < 0.05:
             kitchen.env.drop_held()
@@ -141,5 +143,7 @@ def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed):
     assert sum(r.predicate == "held_by" for r in truth.relations) <= 1
     assert truth.holding is None or truth.parents(truth.holding, CONTAINING) == ()
     assert {n: p for n, p in kitchen.world._parents.items() if p} == {
-        n.id: truth.parents(n.id, CONTAINING)[0] for n in truth.nodes if truth.parents(n.id, CONTAINING)
+        n.id: truth.parents(n.id, CONTAINING)[0]
+        for n in truth.nodes
+        if truth.parents(n.id, CONTAINING)
     }

@@ -5,8 +5,8 @@ import pytest
 from small_kitchen import CONTAINING, SmallKitchen
 
 from forestall.domain.load import shipped
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER
 from forestall.types.plan import Subtask
@@ -29,7 +29,9 @@ CHOICES = [
 def _truth(kitchen: SmallKitchen) -> dict:
     truth = kitchen.env.oracle.truth()
     facts = {(n.id, a): v for n in truth.nodes for a, v in n.states}
-    facts |= {(n.id, "parent"): truth.parents(n.id, CONTAINING) for n in truth.nodes if n.id != GRIPPER}
+    facts |= {
+        (n.id, "parent"): truth.parents(n.id, CONTAINING) for n in truth.nodes if n.id != GRIPPER
+    }
     return facts | {"held": truth.holding, "spoiled": kitchen.spoiled}
 
 

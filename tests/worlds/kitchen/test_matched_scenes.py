@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import InputError, SceneError
 from forestall.tasks.faults import apply_scene_faults, parse_fault
 from forestall.tasks.files import load_task
 from forestall.types.scene import SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen.catalogue import shipped_catalogue
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.needs import AXES

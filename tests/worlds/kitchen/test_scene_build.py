@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from forestall.domain.load import extend, shipped
 from forestall.errors import ForestallError, SceneError, UnknownNameError
 from forestall.types.facts import category_of
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.domain.load import extend, shipped
 from forestall.worlds.kitchen.catalogue import catalogue, shipped_catalogue
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.placement import footprint_at

@@ -8,7 +8,7 @@ from __future__ import annotations
 from forestall.domain.formula import Formula
 from forestall.domain.model import Domain
 from forestall.domain.pddl_problem import parse_problem
-from forestall.planning_new.state import State
+from forestall.planning.state import State
 
 
 def read_problem(text: str, domain: Domain, source: str = "problem") -> tuple[State, Formula]:

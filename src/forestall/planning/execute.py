@@ -14,8 +14,8 @@ from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
 from forestall.domain.formula import Every, Fewer, Formula, Not, Or, Some, bind, free, normal
 from forestall.domain.model import LOCATED, Choice, Effect, Need, Skill
 from forestall.errors import InputError
-from forestall.planning_new.settle import change, settle
-from forestall.planning_new.state import State
+from forestall.planning.settle import change, settle
+from forestall.planning.state import State
 from forestall.types.facts import Literal, is_instance
 from forestall.types.plan import Subtask
 
@@ -174,7 +174,7 @@ def _run(state: State, skill: Skill, args: tuple[str, ...]) -> None:
                 value = state.value(source, attribute)
                 if value is not None:
                     state.set_value(piece, attribute, value)
-    change(state, _spread(skill.effects, made), names)
+    change(state, spread(skill.effects, made), names)
     at = skill.at
     if at in made:
         state.at = made[at][0]
@@ -215,10 +215,10 @@ def _choose(
         raise _RefusedError(_said(state, choice.sentence, names, {}))
 
 
-def _spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> Iterable[Effect]:
+def spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> Iterable[Effect]:
     """Effects on made things once for each of them."""
     for effect in effects:
-        used = [v for v in made if _mentions(effect, v)]
+        used = [v for v in made if mentions(effect, v)]
         if not used:
             yield effect
             continue
@@ -233,7 +233,7 @@ def _spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> I
             )
 
 
-def _mentions(effect: Effect, variable: str) -> bool:
+def mentions(effect: Effect, variable: str) -> bool:
     return (
         variable in free(effect.condition)
         or any(variable in f.args for f in effect.facts)

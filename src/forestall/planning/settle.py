@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from forestall.domain.evaluate import TRUE, evaluate, solutions
 from forestall.domain.model import Effect
 from forestall.errors import DomainError
-from forestall.planning_new.state import State
+from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 ROUNDS = 50
