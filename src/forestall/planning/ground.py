@@ -198,7 +198,9 @@ class _Grounding:
         )
 
     def _suited(self, skill: Skill, names: Names) -> bool:
-        return all(self.schemas.formula(f)(self.grounder, names) is not False for f in skill.prefers)
+        return all(
+            self.schemas.formula(f)(self.grounder, names) is not False for f in skill.prefers
+        )
 
     def _made(self, skill: Skill, names: Names) -> dict[str, tuple[str, ...]]:
         found = {}
@@ -248,7 +250,9 @@ class _Grounding:
             found.append(({}, none, None))
         return found
 
-    def _faced(self, choice: Choice, known: Names, only: Node) -> list[tuple[Names, Node, str | None]]:
+    def _faced(
+        self, choice: Choice, known: Names, only: Node
+    ) -> list[tuple[Names, Node, str | None]]:
         """Things that are chosen once the robot faces them."""
         g, variable = self.grounder, choice.variable.name
         such = self.schemas.join((choice.variable,), choice.such_that, free(choice.such_that))
@@ -520,4 +524,3 @@ def _asks_relation(domain: Domain, formula: Formula) -> bool:
 
 def _asks(formulas: Iterable[Formula], predicate: str) -> bool:
     return any(x.predicate == predicate for f in formulas for x, _ in literals(f))
-

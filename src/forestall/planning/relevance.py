@@ -175,7 +175,9 @@ class _Possible(Grounder):
                         return
             names = dict(names)
             for make in schema.makes:
-                mine = self.universe.made.get((names.get(make.source, ""), schema.name, make.variable))
+                mine = self.universe.made.get(
+                    (names.get(make.source, ""), schema.name, make.variable)
+                )
                 if mine and make.variable not in names:
                     names[make.variable] = mine[0]
         for parameter in schema.parameters:
@@ -289,7 +291,9 @@ class _Closure:
         for arg in literal.args:
             self.use(arg)
         if literal.predicate in (self.domain.roles.unblocked, self.domain.roles.vacant):
-            self.cleared.update(a for a in literal.args if literal.predicate == self.domain.roles.unblocked)
+            self.cleared.update(
+                a for a in literal.args if literal.predicate == self.domain.roles.unblocked
+            )
         self.need(part, {}, 0, always=True)
 
     # --- needs -----------------------------------------------------------------------------------
@@ -390,7 +394,11 @@ class _Closure:
         found = list(self.world.bindings(way, atom))
         if isinstance(way.what, Copy):
             copy = way.what
-            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
+            having = [
+                b
+                for b in found
+                if self.state.value(b[copy.source], copy.attribute) == literal.value
+            ]
             movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
             found = having if having or movable else found
         new = {p.name for p in way.schema.parameters if p.name not in bound}
@@ -468,4 +476,3 @@ def _asks_state(domain: Domain, formula: Formula) -> bool:
         x.predicate not in static and x.predicate in (*domain.predicates, "facing")
         for x, _ in literals(formula)
     )
-

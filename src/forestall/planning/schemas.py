@@ -217,9 +217,7 @@ class Schemas:
             steps.append((variable.name, source, variable.kind, checks))
         return _joined(before, steps)
 
-    def _source(
-        self, part: Formula, variable: str, unbound: set[str]
-    ) -> tuple[int, Source] | None:
+    def _source(self, part: Formula, variable: str, unbound: set[str]) -> tuple[int, Source] | None:
         """Where the things come from for which a part can be true."""
         if isinstance(part, Or):
             several = [self._source(p, variable, unbound) for p in part.parts]
@@ -245,7 +243,9 @@ class Schemas:
         if others or args.count(variable) > 1:
             return None
         if kind is PredicateKind.RELATION:
-            return 1, lambda w, n: w.related(predicate, position, tuple([n.get(a, a) for a in args]))
+            return 1, lambda w, n: w.related(
+                predicate, position, tuple([n.get(a, a) for a in args])
+            )
         if kind is PredicateKind.STATIC:
             return 2, lambda w, n: w.static_related(
                 predicate, position, tuple([n.get(a, a) for a in args])
