@@ -247,10 +247,7 @@ def test_diagnosis_and_repair_save_the_task(name: str) -> None:
         if fault and str(steps.subtasks[index]) == "put_in(Mug, CoffeeMachine)":
             fault = False
             put = state.copy()
-            put.held = None
-            put.places["Mug-1"] = next(
-                iter(observed(scene("Mug-1 on Floor-1"), DOMAIN).places.values())
-            )
+            put.add(("on_top_of", "Mug-1", "Floor-1"))
             states[-1] = state = put
         text = str(steps.subtasks[index])
         left = len(steps) - index

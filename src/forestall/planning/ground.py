@@ -66,6 +66,8 @@ class _SkillPlan:
 
     def __init__(self, domain: Domain, skill: Skill) -> None:
         self.skill = skill
+        families = [s.family or s.name for s in domain.skills.values()]
+        self.rank = families.index(skill.family or skill.name)
         self.simple = simple_needs(domain, skill)
         self.relational = [e for e in skill.effects if _adds_relation(domain, e)]
         self.stable = not any(
@@ -114,6 +116,7 @@ class _Grounding:
                 g.allow(fact)
         self._explore()
         bindings = [(p, b) for p in self.plans for b in self._bindings(p)]
+        bindings.sort(key=self._order)
         for plan, names in bindings:
             for effect in plan.skill.effects:
                 g.maybe.update(names[v] for v in effect.gone if v in names)
@@ -207,6 +210,13 @@ class _Grounding:
             if pieces:
                 found[make.variable] = pieces
         return found
+
+    def _order(self, binding: tuple[_SkillPlan, Names]) -> tuple[object, ...]:
+        """Of equal steps the search takes the first: what is put away goes to a support first."""
+        plan, names = binding
+        several = [by_number(x) for x in names.values()]
+        away = any(x in self.universe.supports for x in list(names.values())[-1:])
+        return plan.rank, several[:-1], not away, several
 
     # --- choices ---------------------------------------------------------------------------------
 
@@ -316,7 +326,7 @@ class _Grounding:
             changes = list(self._changes(skill.effects, bound, made))
             if made:
                 changes += self._births(skill, bound, made)
-            if any(c.condition is True and c.add == [-1] for c in changes):
+            if any(c.condition is True and -1 in c.add for c in changes):
                 continue
             prefers = [
                 part
@@ -394,13 +404,13 @@ class _Grounding:
             self._set(change, atom[1], fact.predicate, fact.value)
         elif known.kind is PredicateKind.HISTORY:
             (change.delete if fact.value == "false" else change.add).append(g.number_of(atom))
-        elif atom in g.possible:
-            if fact.value == "false":
+        elif fact.value == "false":
+            if atom in g.possible:
                 change.delete.append(g.number_of(atom))
-            else:
-                change.add.append(g.number_of(atom))
-                change.delete += g.rivals(atom)
-        elif fact.value == "true":
+        elif atom in g.possible and self._may(atom):
+            change.add.append(g.number_of(atom))
+            change.delete += g.rivals(atom)
+        else:
             change.add.append(-1)
 
     def _set(self, change: Change, name: str, attribute: str, value: str) -> None:

@@ -229,11 +229,13 @@ class _Closure:
         self.state, self.domain = state, state.domain
         self.all_made = makeable(state)
         self.world = _Possible(state, self.all_made)
+        self.schemas = self.world.schemas
         self.kept: set[str] = set()
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self.purposeful: set[str] = set()
         self.cleared: set[str] = set()
         self.visited: set[tuple[object, ...]] = set()
+        self._eases: dict[str, tuple[object, ...]] = {}
 
     def keep(self, names: Iterable[str]) -> None:
         """Keep things, with what has them, what blocks them, and what fills a limited place."""
@@ -300,7 +302,7 @@ class _Closure:
             return
         if not always and evaluate(formula, self.state, names) == TRUE:
             return
-        self._need(normal(formula), names, depth)
+        self._need(self.schemas.normal(formula), names, depth)
 
     def _need(self, formula: Formula, names: Names, depth: int) -> None:
         if isinstance(formula, Literal):
@@ -318,22 +320,22 @@ class _Closure:
             for bound in self._best(found, {v.name for v in formula.variables}):
                 self.need(formula.part, bound, depth + 1)
         elif isinstance(formula, Every):
-            against = normal(formula.part, False)
+            against = self.schemas.normal(formula.part, False)
             for bound, truth in solutions(formula.variables, against, self.state, names):
                 if truth == TRUE:
                     self.need(formula.part, bound, depth + 1)
         elif isinstance(formula, Fewer):
-            denied = Not(formula.part)
+            denied = self.schemas.normal(formula.part, False)
             for bound, truth in solutions((formula.variable,), formula.part, self.state, names):
                 if truth == TRUE:
-                    self._need(normal(denied), bound, depth + 1)
+                    self._need(denied, bound, depth + 1)
         elif isinstance(formula.part, Literal):
             literal = formula.part.bind(names)
             for value in self.domain.values(literal.predicate):
                 if value != literal.value:
                     self._achieve(Literal(literal.predicate, literal.args, value), depth)
 
-    def _best(self, found: Sequence[Names], new: set[str]) -> list[Names]:
+    def _best(self, found: Sequence[Names], new: set[str], most: int = GROUPS) -> list[Names]:
         """The most promising bindings, one for each combination of categories."""
         groups: dict[tuple[str, ...], list[Names]] = {}
         categories = self.world.categories
@@ -343,14 +345,20 @@ class _Closure:
         best = [min(g, key=lambda b: [self._ease(b[v]) for v in sorted(new) if v in b])
                 for g in groups.values()]  # fmt: skip
         best.sort(key=lambda b: [self._ease(b[v]) for v in sorted(new) if v in b])
-        for bound in best[:GROUPS]:
+        for bound in best[:most]:
             self.keep(bound[v] for v in new if v in bound)
-        return best[:GROUPS]
+        return best[:most]
 
     def _ease(self, name: str) -> tuple[object, ...]:
+        rest = self._eases.get(name)
+        if rest is None:
+            rest = self._eases[name] = self._judged(name)
+        return (rest[0], name not in self.kept, *rest[1:])
+
+    def _judged(self, name: str) -> tuple[object, ...]:
         state, roles = self.state, self.domain.roles
         if name not in state.kinds:
-            return (2, True, True, by_number(name))
+            return (True, True, True, True, by_number(name))
         held = any(h == name for _, h in state.in_hands())
         category = state.kind(name)
         shut_in = roles.accessible is not None and not state.says(roles.accessible, name)
@@ -358,8 +366,7 @@ class _Closure:
         full = bool(category.numbers) and bool(state.contents(name))
         avoided = bool(category.tags & set(roles.avoid))
         fixed = roles.fixture in category.tags
-        rank = 0 if held or name in self.kept else 1
-        return (avoided, rank, not fixed, shut_in or blocked or full, by_number(name))
+        return (avoided, not held, not fixed, shut_in or blocked or full, by_number(name))
 
     def _achieve(self, literal: Literal, depth: int) -> None:
         key = (literal.predicate, *literal.args, literal.value)
@@ -372,7 +379,7 @@ class _Closure:
         if known.kind is PredicateKind.DERIVED:
             assert known.definition is not None
             names = {p.name: a for p, a in zip(known.parameters, literal.args, strict=True)}
-            definition = known.definition if literal.value != "false" else Not(known.definition)
+            definition = self.schemas.normal(known.definition, literal.value != "false")
             self.need(definition, names, depth)
             return
         if literal.value == "false":
@@ -400,8 +407,9 @@ class _Closure:
         else:
             conditions += [n.formula for n in way.schema.needs]
             new |= {c.variable.name for c in way.schema.choices}
-        for binding in self._best(found, new):
-            hand = way.schema.hand if isinstance(way.schema, Skill) else None
+        hand = way.schema.hand if isinstance(way.schema, Skill) else None
+        most = GROUPS if isinstance(way.schema, Process) or hand in new else 1
+        for binding in self._best(found, new, most):
             for variable in new & binding.keys():
                 if variable == hand or isinstance(way.schema, Process):
                     self.use(binding[variable])

@@ -85,7 +85,16 @@ class Schemas:
     def __init__(self, domain: Domain) -> None:
         self.domain = domain
         self._formulas: dict[tuple[int, frozenset[str]], tuple[Formula, Ground]] = {}
+        self._normal: dict[tuple[int, bool], tuple[Formula, Formula]] = {}
         self._joins: dict[object, tuple[Formula, Join]] = {}
+
+    def normal(self, formula: Formula, positive: bool = True) -> Formula:
+        """The negation normal form, made once."""
+        key = (id(formula), positive)
+        found = self._normal.get(key)
+        if found is None or found[0] is not formula:
+            found = self._normal[key] = (formula, normal(formula, positive))
+        return found[1]
 
     def formula(self, formula: Formula, bound: frozenset[str] | None = None) -> Ground:
         """The function that grounds a formula whose free variables are bound."""
