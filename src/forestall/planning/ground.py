@@ -15,7 +15,7 @@ from forestall.domain.model import FACING, Choice, Domain, Effect, PredicateKind
 from forestall.planning.execute import mentions
 from forestall.planning.grounder import EXISTS, Grounder, Universe
 from forestall.planning.nodes import Junction, Node, all_of, any_of, negate
-from forestall.planning.schemas import Schemas
+from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
@@ -74,14 +74,6 @@ class _SkillPlan:
             _asks_relation(domain, e.condition) for e in self.relational
         ) and not (skill.choices or skill.makes)
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
-
-
-def schemas_of(domain: Domain) -> Schemas:
-    """The compiled formulas of a domain, made once and kept with it."""
-    found = domain.__dict__.get("_schemas")
-    if found is None:
-        found = domain.__dict__["_schemas"] = Schemas(domain)
-    return found  # type: ignore[no-any-return]
 
 
 def ground(state: State, universe: Universe) -> Grounding:
@@ -261,7 +253,7 @@ class _Grounding:
     def _faced(self, choice: Choice, known: Names, only: Node) -> list[tuple[Names, Node, str | None]]:
         """Things that are chosen once the robot faces them."""
         g, variable = self.grounder, choice.variable.name
-        such = self.schemas.join((choice.variable,), choice.such_that, free(choice.such_that))
+        such = self.schemas.join((choice.variable,), choice.such_that, self.schemas.free(choice.such_that))
         found: list[tuple[Names, Node, str | None]] = []
         for bound, node in such(g, known):
             name = bound[variable]
@@ -293,7 +285,7 @@ class _Grounding:
     def _fitting(self, choice: Choice, formula: Formula, known: Names) -> list[tuple[str, Node]]:
         """Things that a formula and `such_that` are true of, lowest number first."""
         g, variable = self.grounder, choice.variable.name
-        join = self.schemas.join((choice.variable,), formula, free(formula))
+        join = self.schemas.join((choice.variable,), formula, self.schemas.free(formula))
         such = self.schemas.formula(choice.such_that)
         nodes: dict[str, Node] = {}
         for bound, node in join(g, known):
@@ -372,7 +364,7 @@ class _Grounding:
                     if node is not False:
                         yield effect, known, node
                     continue
-                join = self.schemas.join(effect.variables, effect.condition, free(effect.condition))
+                join = self.schemas.join(effect.variables, effect.condition, self.schemas.free(effect.condition))
                 for bound, node in join(g, known):
                     yield effect, bound, node
 

@@ -24,9 +24,10 @@ from forestall.domain.formula import (
 )
 from forestall.domain.model import Copy, Domain, Effect, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, Made, makeable
-from forestall.planning.ground import schemas_of, simple_needs
+from forestall.planning.ground import simple_needs
 from forestall.planning.grounder import Grounder, Universe
 from forestall.planning.nodes import Node
+from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
@@ -185,7 +186,7 @@ class _Possible(Grounder):
             if name is not None and parameter.kind and not self.is_a(name, parameter.kind):
                 return
         left = tuple(p for p in schema.parameters if p.name not in names)
-        join = self.schemas.join(left, way.simple, frozenset(names) & free(way.simple))
+        join = self.schemas.join(left, way.simple, frozenset(names) & self.schemas.free(way.simple))
         for bound, _ in join(self, names):
             yield from self._chosen(way, bound)
 
@@ -199,9 +200,9 @@ class _Possible(Grounder):
             for known in several:
                 found: dict[str, None] = {}
                 for formula in choice.among:
-                    needed = free(formula) | free(choice.such_that)
+                    needed = self.schemas.free(formula) | self.schemas.free(choice.such_that)
                     if needed - {variable} <= known.keys():
-                        join = self.schemas.join((choice.variable,), formula, free(formula))
+                        join = self.schemas.join((choice.variable,), formula, self.schemas.free(formula))
                         found.update((b[variable], None) for b, _ in join(self, known))
                         if found and not _asks_state(self.domain, formula):
                             break
@@ -209,12 +210,12 @@ class _Possible(Grounder):
             several = more
         for known in several:
             own = {v.name for v in way.effect.variables}
-            needed = free(way.effect.condition) - own
+            needed = self.schemas.free(way.effect.condition) - own
             if needed <= known.keys():
                 condition = way.effect.condition
                 if own:
                     open_now = tuple(v for v in way.effect.variables if v.name not in known)
-                    bound = frozenset(free(condition)) & frozenset(known)
+                    bound = frozenset(self.schemas.free(condition)) & frozenset(known)
                     join = self.schemas.join(open_now, condition, bound)
                     if any(True for _ in join(self, known)):
                         yield known
@@ -298,7 +299,7 @@ class _Closure:
 
     def need(self, formula: Formula, names: Names, depth: int, always: bool = False) -> None:
         """Keep what can make a formula true."""
-        if depth > DEPTH or not free(formula) <= names.keys():
+        if depth > DEPTH or not self.schemas.free(formula) <= names.keys():
             return
         if not always and evaluate(formula, self.state, names) == TRUE:
             return
@@ -315,7 +316,7 @@ class _Closure:
                 if self.world.schemas.formula(part)(self.world, names) is not False:
                     self.need(part, names, depth)
         elif isinstance(formula, Some):
-            join = self.world.schemas.join(formula.variables, formula.part, free(formula))
+            join = self.world.schemas.join(formula.variables, formula.part, self.schemas.free(formula))
             found = [b for b, _ in join(self.world, names)]
             for bound in self._best(found, {v.name for v in formula.variables}):
                 self.need(formula.part, bound, depth + 1)
@@ -394,12 +395,6 @@ class _Closure:
 
     def _follow(self, way: _Way, atom: tuple[str, ...], literal: Literal, depth: int) -> None:
         bound = set(way.what.args) if isinstance(way.what, Literal) else {way.what.target}
-        found = list(self.world.bindings(way, atom))
-        if isinstance(way.what, Copy):
-            copy = way.what
-            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
-            movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
-            found = having if having or movable else found
         new = {p.name for p in way.schema.parameters if p.name not in bound}
         conditions = [way.effect.condition] if not way.effect.variables else []
         if isinstance(way.schema, Process):
@@ -407,6 +402,14 @@ class _Closure:
         else:
             conditions += [n.formula for n in way.schema.needs]
             new |= {c.variable.name for c in way.schema.choices}
+        found = list(self.world.bindings(way, atom))
+        if isinstance(way.what, Copy):
+            copy = way.what
+            if _denied(conditions, copy, literal.value):
+                return
+            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
+            movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
+            found = having if having or movable else found
         hand = way.schema.hand if isinstance(way.schema, Skill) else None
         most = GROUPS if isinstance(way.schema, Process) or hand in new else 1
         for binding in self._best(found, new, most):
@@ -436,6 +439,12 @@ class _Closure:
                 return
         for way in self.world.ways.get(f"not {literal.predicate}", ()):
             self._follow(way, (literal.predicate, *literal.args), literal, depth)
+
+
+def _denied(conditions: Sequence[Formula], copy: Copy, value: str) -> bool:
+    """Whether a skill that copies a value asks that the source does not have it."""
+    banned = Literal(copy.attribute, (copy.source,), value)
+    return any(isinstance(f, Not) and f.part == banned for f in conditions)
 
 
 def _ways(domain: Domain) -> dict[str, list[_Way]]:
