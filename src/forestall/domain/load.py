@@ -92,10 +92,9 @@ def read_domain(text: str, source: str) -> Domain:
     except tomllib.TOMLDecodeError as error:
         raise FileFormatError(f"{source}: not valid TOML: {error}") from error
     try:
-        domain = build_domain(data)
+        return build_domain(data)
     except InputError as error:
         raise located(source, text, error) from error
-    return domain
 
 
 def located(source: str, text: str, error: InputError) -> DomainError:
@@ -183,7 +182,7 @@ def extend(domain: Domain, categories: Mapping[str, Any], attributes: Mapping[st
 def _open_facts(
     domain: Domain, predicate: str, name: str, new: Mapping[str, Any]
 ) -> set[tuple[str, ...]]:
-    spec = dict(domain.categories[name].extra).get(f"#{predicate}", ())
+    spec = domain.categories[name].extra.get(f"#{predicate}", ())
     assert isinstance(spec, tuple)
     found = chosen(domain, predicate, name, spec)
     return {(name, other) for other in found if other in new}
