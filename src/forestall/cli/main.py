@@ -18,6 +18,7 @@ from forestall.cli import experiments
 from forestall.cli.bench import bench
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
+from forestall.cli.domain import domain
 from forestall.cli.encoder import encoder
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
@@ -33,6 +34,7 @@ app = App(
 for command in (run, tasks, scenarios, check, compare, doctor):
     app.command(command)
 app.command(demos)
+app.command(domain)
 app.command(bench)
 experiments.register(bench)
 app.command(encoder)
