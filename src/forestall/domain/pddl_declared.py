@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from forestall.domain.formula import Parameter
+from forestall.domain.located import keyed
 from forestall.domain.model import BUILT_IN
 from forestall.domain.pddl_formula import Reader, Value
 from forestall.domain.pddl_text import (
@@ -154,7 +155,7 @@ class Declared:
                     error = unknown(
                         Word("", 0), f"predicate in values of attribute {attribute}", key, free
                     )
-                    raise _keyed(InputError(str(error)), f"[attributes.{attribute}")
+                    raise keyed(InputError(str(error)), f"[attributes.{attribute}")
                 values[key] = Value(attribute, value, otherwise)
         return values
 
@@ -229,8 +230,3 @@ def spell(spelling: dict[str, str], name: str, word: Word) -> None:
         )
     if word.text != name:
         spelling[name] = word.text
-
-
-def _keyed(error: InputError, *keys: str) -> InputError:
-    error.keys = keys  # type: ignore[attr-defined]
-    return error

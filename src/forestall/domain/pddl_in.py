@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from forestall.domain.formula import TRUE, And, Formula, Or, Parameter, bind, show
-from forestall.domain.load import build_domain, located
+from forestall.domain.load import build_domain
+from forestall.domain.located import located
 from forestall.domain.model import Domain
 from forestall.domain.pddl_declared import Declared, plain, value_key
 from forestall.domain.pddl_formula import Reader, Value, apart
