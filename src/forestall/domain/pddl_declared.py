@@ -41,7 +41,7 @@ class Declared:
         constants: name → type.
         predicates: PDDL name → (our name, parameters).
         tags: union of types → the types.
-        spelling: our name → that of the file, where they differ.
+        spelling: our name → that of the file.
     """
 
     grouped: dict[str, dict[str, str]]
@@ -196,6 +196,11 @@ def value_key(attribute: str, value: str) -> str:
     return f"{attribute}={value}"
 
 
+def differing(spelling: dict[str, str]) -> dict[str, str]:
+    """Names, in order, that a file spells in another way."""
+    return {name: spelt for name, spelt in sorted(spelling.items()) if name != spelt}
+
+
 def things_of(
     section: Group, types: Types, known: dict[str, str], spelling: dict[str, str]
 ) -> dict[str, str]:
@@ -228,5 +233,4 @@ def spell(spelling: dict[str, str], name: str, word: Word) -> None:
         raise AtLineError(
             word.line, f"{before} and {word} would both be called {name} here: rename one"
         )
-    if word.text != name:
-        spelling[name] = word.text
+    spelling[name] = word.text
