@@ -72,7 +72,9 @@ class Step:
         """What the kitchen and the domain do not agree on."""
         if isinstance(self.after, Refusal) != self.refused:
             said = self.after.reason if isinstance(self.after, Refusal) else "succeeds"
-            return [f"{self.subtask}: the domain {said!r}, the kitchen {self.reason or 'succeeds'!r}"]
+            return [
+                f"{self.subtask}: the domain {said!r}, the kitchen {self.reason or 'succeeds'!r}"
+            ]
         known = belief(self.before if isinstance(self.after, Refusal) else self.after)
         return [
             f"{self.subtask}: {key} is {self.truth.get(key)!r}, believed {known.get(key)!r}"
@@ -365,9 +367,7 @@ class Coverage:
             self._only_by(
                 label, effect.variables, original.condition, effect.condition, state, names
             )
-        self._missing(
-            label, effect.variables, original.condition, state, names, effect.condition
-        )
+        self._missing(label, effect.variables, original.condition, state, names, effect.condition)
 
     def _missing(
         self,

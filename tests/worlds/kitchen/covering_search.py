@@ -4,9 +4,10 @@
         [SECONDS] [SEED] [parts] [smallest]
 
 Random starts and random subtasks, inclined towards what can be executed. An episode is kept, up to
-its last useful step, where it covers a case that no other does or (with "mutants") kills a mutant that
-survived; with "smallest" those that later ones make needless are left out in the end.
-What is in the corpus already stays. Stops with the episode in hand where the kitchen and the domain
+its last useful step, where it covers a case that no other does or kills a mutant that survived (one
+that lacks a whole need, effect or process; with "parts" one that lacks a part of it, too). With
+"smallest" the episodes that later ones make needless are left out in the end; episodes may also be
+written by hand. What is in the corpus already stays. Stops with the episode in hand where the kitchen and the domain
 file disagree.
 """
 
