@@ -2,7 +2,8 @@
 
 `UNREACHABLE`: cases of `covering.cases` for which there is no situation; a test fails where one is
 reached after all, or where the domain no longer has it. `EQUIVALENT`: mutants of `mutants.mutants`
-that behave like the whole domain. Keys are patterns over names; the first that fits gives the reason.
+that behave like the whole domain. Keys are patterns over names; the first that fits gives the
+reason.
 """
 
 from __future__ import annotations
