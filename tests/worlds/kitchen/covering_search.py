@@ -20,7 +20,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
-from covering import CORPUS, Coverage, Episode, Run, Step, fixed, load_corpus, play
+from covering import Coverage, fixed, play
+from covering_play import CORPUS, Episode, Run, Step, load_corpus
 from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 

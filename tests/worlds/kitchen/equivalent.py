@@ -63,10 +63,12 @@ UNREACHABLE: dict[str, str] = {
 EQUIVALENT: dict[str, str] = {
     r".*: need \d+ \[located\(.*": _LOST,
     r"put_(in|on): need 5 \[not within.*": _NESTED,
+    r"pick_up: effect 2: not blocking\(\?y, \?object\)":
+        "nothing stands in front of what can be picked up",
     r"(crack|slice)_obj: effect (6|7)( .*|:.*)?": _LIQUID,
     r"crack_obj: effect (4|8|12|16)(:.*)?": _FRESH,
     r"crack_obj: effect (14|15)(:.*)?": _LIQUID,
-}
+}  # fmt: skip
 
 
 def why_equivalent(name: str) -> str | None:

@@ -20,7 +20,8 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from catalogue import differences, lacking
-from covering import Step, load_corpus, play
+from covering import play
+from covering_play import Step, load_corpus
 from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 
