@@ -25,7 +25,7 @@ from forestall.domain.formula import (
 )
 from forestall.domain.load import load_domain
 from forestall.errors import InputError
-from forestall.planning_new.state import State
+from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 NAMES = st.sampled_from(["?x", "?y", "?z", "Mug-1", "gripper", "l1"])

@@ -8,7 +8,7 @@ from pddl_corpus import FOLDER
 from forestall.domain.load import load_domain
 from forestall.domain.pddl_in import read_pddl
 from forestall.errors import DomainError, FileFormatError
-from forestall.planning_new.pddl_problem import read_problem
+from forestall.planning.pddl_problem import read_problem
 
 LAMPS = (FOLDER / "lamps.pddl").read_text()
 NOTES = (FOLDER / "lamps.annotations.toml").read_text()

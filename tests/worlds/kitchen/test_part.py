@@ -6,7 +6,7 @@ import pytest
 
 from forestall.errors import UnknownNameError
 from forestall.types.scene import SceneNeeds
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 from forestall.worlds.kitchen import part
 from forestall.worlds.kitchen.part import Kitchens
 
@@ -27,7 +27,7 @@ def test_frames_are_remembered_only_where_many_runs_follow(monkeypatch: pytest.M
     monkeypatch.setattr(part, "KitchenEnvironment", environment)
     kitchens = Kitchens()
     for remember in (False, True, True):
-        with kitchens.open(SceneNeeds(), household(), remember) as opened:
+        with kitchens.open(SceneNeeds(), shipped("household"), remember) as opened:
             assert opened.environment is opened.disturbance
     assert made[0] is None
     assert made[1] is made[2] is not None
