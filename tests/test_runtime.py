@@ -12,6 +12,7 @@ import pytest
 
 from forestall.assembly.configuration import RunConfig, run_config
 from forestall.assembly.make import make_strategy
+from forestall.domain.model import Domain
 from forestall.errors import PerceptionError
 from forestall.memory.recording import demonstration_from
 from forestall.perception.config import ScopeConfig

@@ -150,10 +150,6 @@ def test_replace_argument_and_plan():
             "has no target",
         ),
         ({"kind": "insert_step", "step": "pick_up(Mug)"}, "before"),
-        (
-            {"kind": "insert_step", "step": "grab(Mug)", "after": "pick_up(Mug)"},
-            "unknown skill 'grab'",
-        ),
         ({"kind": "drop_step", "step": "pick_up Mug"}, "cannot read"),
         ({"kind": "drop_step", "step": "pick_up(Mug)", "occurence": 2}, "occurence"),
         ({"kind": "dropstep"}, "drop_step"),
@@ -167,6 +163,27 @@ def test_replace_argument_and_plan():
 def test_a_plan_fault_that_fits_nothing_says_which_field_and_what_would(table, message):
     with pytest.raises(InputError, match=message):
         _plan(**table)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            {"kind": "insert_step", "step": "grab(Mug)", "after": "pick_up(Mug)"},
+            r"step 3, grab\(Mug\): unknown skill 'grab'",
+        ),
+        (
+            {"kind": "replace_plan", "plan": ["pick_up(Mug, Sink)"]},
+            r"pick_up takes 1 argument\(s\)",
+        ),
+        ({"kind": "drop", "step": "grab(Mug)"}, "unknown skill 'grab'"),
+    ],
+)
+def test_a_skill_that_the_domain_does_not_have_is_named_when_the_steps_are_checked(table, message):
+    fault = f.parse_fault(table)
+    plan = f.apply_plan_faults(PLAN, [fault], DOMAIN)
+    with pytest.raises(InputError, match=message):
+        f.check_steps(plan, [fault], DOMAIN)
 
 
 def test_faults_embed_in_a_file_schema():

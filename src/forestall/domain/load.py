@@ -227,7 +227,9 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
     _known(label, table, _ATTRIBUTE)
     base = domain.attributes.get(name)
     if base is None and (name in domain.predicates or name in domain.skills or name in BUILT_IN):
-        kind = domain.predicates[name].kind.value if name in domain.predicates else "skill"
+        kind = "skill" if name in domain.skills else "built-in fact"
+        if name in domain.predicates:
+            kind = domain.predicates[name].kind.value
         raise InputError(f"{label}: {name!r} is the name of a {kind}: choose another one")
     if not re.fullmatch(r"[a-z]+(_[a-z]+)*", name):
         raise InputError(f"{label}: the name must be lower-case letters a-z, joined by '_'")

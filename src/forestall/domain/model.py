@@ -77,7 +77,7 @@ class Predicate:
     group: str | None = None
     symmetric: bool = False
     mirrors: str = ""
-    scored: bool = False
+    scored: bool = True
     geometry: str = ""
     offered_by: str = ""
     material: bool = True

@@ -87,7 +87,8 @@ def alternatives(state: State, goal: Goal, whole: bool = False) -> Alternatives:
         literal = _literal(part)
         names = {}
         for position, arg in enumerate(literal.args):
-            if options.definite(arg):
+            denied = negated(part) is not None and is_instance(arg)  # of each, see `for_all`
+            if denied or options.definite(arg):
                 names[position] = state.domain.canonical(arg)
             else:
                 variable = f"?{len(ground)}.{position}" if not is_instance(arg) else f"?={arg}"
