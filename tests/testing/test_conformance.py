@@ -1,5 +1,6 @@
 import numpy as np
 
+from forestall.domain.load import shipped
 from forestall.testing.conformance import check_environment
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
@@ -7,6 +8,7 @@ from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.vocabulary import household
 from forestall.worlds.kitchen.flat_world import flat_environment
 
+HOUSEHOLD = shipped("household")
 STEPS = [Subtask.parse(s) for s in ("pick_up(Mug)", "put_in(Mug, Sink)", "pick_up(Pot)")]
 
 
@@ -25,7 +27,7 @@ class _Broken:
 
 
 def test_the_household_conforms():
-    assert check_environment(_make, 3, STEPS) == []
+    assert check_environment(_make, 3, STEPS, HOUSEHOLD) == []
 
 
 def test_a_seed_that_does_not_repeat_is_found():
@@ -35,7 +37,7 @@ def test_a_seed_that_does_not_repeat_is_found():
         def reset(self, seed):
             self._inner.reset(seed + next(count))
 
-    complaints = check_environment(Drifting, 0, STEPS)
+    complaints = check_environment(Drifting, 0, STEPS, HOUSEHOLD)
     assert any("with seed 0" in c for c in complaints)
 
 
@@ -48,7 +50,7 @@ def test_a_picture_that_does_not_repeat_is_found():
             observation.frames[0].rgb[0, 0, 0] = rng.integers(256)
             return observation
 
-    assert any("rgb differs" in c for c in check_environment(Noisy, 0, STEPS))
+    assert any("rgb differs" in c for c in check_environment(Noisy, 0, STEPS, HOUSEHOLD))
 
 
 def test_an_exception_on_an_unknown_name_is_found():
@@ -58,7 +60,7 @@ def test_an_exception_on_an_unknown_name_is_found():
                 raise KeyError(subtask.args[0])
             return self._inner.execute(subtask)
 
-    assert any("raises KeyError" in c for c in check_environment(Raising, 0, STEPS))
+    assert any("raises KeyError" in c for c in check_environment(Raising, 0, STEPS, HOUSEHOLD))
 
 
 def test_nonsense_that_succeeds_is_found():
@@ -66,7 +68,7 @@ def test_nonsense_that_succeeds_is_found():
         def execute(self, subtask):
             return SkillOutcome(SkillStatus.SUCCEEDED, 0.0)
 
-    assert any("must be refused" in c for c in check_environment(Agreeable, 0, STEPS))
+    assert any("must be refused" in c for c in check_environment(Agreeable, 0, STEPS, HOUSEHOLD))
 
 
 def test_a_duration_that_did_not_pass_is_found():
@@ -75,7 +77,7 @@ def test_a_duration_that_did_not_pass_is_found():
             outcome = self._inner.execute(subtask)
             return SkillOutcome(outcome.status, outcome.duration_s + 1.0, outcome.reason)
 
-    assert any("reports" in c for c in check_environment(Boasting, 0, STEPS))
+    assert any("reports" in c for c in check_environment(Boasting, 0, STEPS, HOUSEHOLD))
 
 
 def test_a_refusal_without_a_reason_is_found():
@@ -84,4 +86,4 @@ def test_a_refusal_without_a_reason_is_found():
             outcome = self._inner.execute(subtask)
             return SkillOutcome(outcome.status, outcome.duration_s)
 
-    assert any("without a reason" in c for c in check_environment(Silent, 0, STEPS))
+    assert any("without a reason" in c for c in check_environment(Silent, 0, STEPS, HOUSEHOLD))

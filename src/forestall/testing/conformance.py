@@ -1,7 +1,8 @@
 """Conformance suite: what every `Environment` must do, whatever world is behind it.
 
 Run it on a new adapter before anything else (after Gymnasium's environment checker). It speaks to
-the Protocol only and returns complaints in words; an empty list is a pass.
+the Protocol only, tries the skills of the world's domain, and returns complaints in words; an empty
+list is a pass.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def check_environment(
         make: builds a fresh environment.
         seed: of the scene to check.
         subtasks: a short plan that the scene allows; its outcomes must repeat.
-        domain: its skills are tried with nonsense.
+        domain: what the world is about; each of its skills is tried on names that mean nothing.
 
     Returns:
         One sentence for each thing that is wrong: a run that does not repeat to the last bit, time
@@ -133,6 +134,8 @@ def _differences(a: Observation, b: Observation) -> Iterator[str]:
             yield "instance_ids"
         if one.instance_names != other.instance_names:
             yield "instance_names"
+    if a.graph != b.graph:
+        yield "the scene graph"
     if a.gripper != b.gripper:
         yield "the gripper"
     if a.robot_position_world_m != b.robot_position_world_m:
@@ -149,16 +152,23 @@ def _same_ids(a: object, b: object) -> bool:
 
 def _refuses_nonsense(environment: Environment, seed: int, domain: Domain) -> Iterator[str]:
     environment.reset(seed)
-    known = next(iter(domain.categories))
-    for skill in domain.skills.values():
-        for name in (NONSENSE, f"{NONSENSE}-7", "", f"{known}-99999"):
-            subtask = Subtask(skill.name, (name,) * len(skill.parameters))
-            try:
-                outcome = environment.execute(subtask)
-            except Exception as error:  # noqa: BLE001  (that nothing is raised is what is checked)
-                yield f"{subtask} raises {error!r}; it must be refused with a reason"
-                continue
-            if outcome.status is SkillStatus.SUCCEEDED:
-                yield f"{subtask} succeeds; it must be refused"
-            elif not outcome.reason:
-                yield f"{subtask} is refused without a reason"
+    known = domain.tagged(domain.roles.movable)[:1]
+    absent = [NONSENSE, f"{NONSENSE}-7", "", *(f"{category}-99999" for category in known)]
+    tried = [
+        Subtask(skill.name, (name,) * len(skill.parameters))
+        for skill in domain.skills.values()
+        for name in absent
+        if skill.parameters
+    ]
+    without = [Subtask(s.name, ()) for s in domain.skills.values() if s.parameters]
+    tried += [Subtask(NONSENSE.lower(), known), *without]
+    for subtask in tried:
+        try:
+            outcome = environment.execute(subtask)
+        except Exception as error:  # noqa: BLE001  (that nothing is raised is what is checked)
+            yield f"{subtask} raises {error!r}; it must be refused with a reason"
+            continue
+        if outcome.status is SkillStatus.SUCCEEDED:
+            yield f"{subtask} succeeds; it must be refused"
+        elif not outcome.reason:
+            yield f"{subtask} is refused without a reason"

@@ -6,11 +6,15 @@ World frame everywhere: right-handed, metres, z up. Camera frame: x right, y dow
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import PerceptionError
+
+if TYPE_CHECKING:
+    from forestall.types.graph import SceneGraph
 
 Rgb = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
@@ -127,13 +131,25 @@ class GripperState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """One or more frames taken at one boundary, newest last, with gripper and clock."""
+    """What was seen and felt at one boundary.
+
+    Args:
+        frames: taken at this boundary, newest last; empty where a graph was given instead.
+        gripper: the robot's own sense of its hand.
+        time_s: of the world's clock.
+        robot_position_world_m: where the robot stands.
+        graph: what is in view as a scene graph, from a source that needs no pictures.
+
+    Raises:
+        PerceptionError: neither a frame nor a graph.
+    """
 
     frames: tuple[Frame, ...]
     gripper: GripperState
     time_s: float
     robot_position_world_m: Vec3 = (0.0, 0.0, 0.0)
+    graph: SceneGraph | None = None
 
     def __post_init__(self) -> None:
-        if not self.frames:
-            raise PerceptionError("an observation needs at least one frame")
+        if not self.frames and self.graph is None:
+            raise PerceptionError("an observation needs at least one frame, or a scene graph")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import SceneError
 from forestall.testing.conformance import check_environment
 from forestall.types.episode import SkillStatus
@@ -39,7 +40,7 @@ def _do(env, *steps):
 
 def test_the_kitchen_conforms():
     steps = [Subtask.parse(s) for s in ("pick_up(Mug)", "put_in(Mug, Sink)", "open_obj(Fridge)")]
-    assert check_environment(_make, 5, steps) == []
+    assert check_environment(_make, 5, steps, shipped("household")) == []
 
 
 def test_a_scan_looks_all_around_and_leaves_the_robot_as_it_was(env):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from inspect import signature
 
 from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillOutcome, SkillStatus
@@ -95,11 +96,22 @@ def perform(robot: Robot, subtask: Subtask) -> SkillOutcome:
     """Run one skill on the household; what cannot be done is refused and never raised."""
     start_s = robot.household.time_s
     try:
-        reason = SKILL_TABLE[subtask.skill](robot, *subtask.args)
+        reason = _skill_of(subtask)(robot, *subtask.args)
         status = SkillStatus.SUCCEEDED
     except (RefusalError, SceneError) as refusal:
         reason, status = str(refusal), SkillStatus.REFUSED
     return SkillOutcome(status, robot.household.time_s - start_s, reason)
+
+
+def _skill_of(subtask: Subtask) -> Callable[..., str]:
+    """What carries a subtask out; one that this robot cannot read is refused."""
+    skill = SKILL_TABLE.get(subtask.skill)
+    if skill is None:
+        raise RefusalError(f"this robot has no skill {subtask.skill!r}")
+    takes = len(signature(skill).parameters) - 1
+    if len(subtask.args) != takes:
+        raise RefusalError(f"{subtask.skill} takes {takes} argument(s), got {len(subtask.args)}")
+    return skill
 
 
 def navigate_to_obj(robot: Robot, target: str) -> str:
@@ -358,4 +370,4 @@ SKILL_TABLE: dict[str, Callable[..., str]] = {
     "crack_obj": crack_obj,
     "pour": pour,
 }
-"""Verb of `types.plan.SKILLS` → what carries it out."""
+"""Verb → what carries it out."""
