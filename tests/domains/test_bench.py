@@ -186,7 +186,7 @@ def test_a_stripped_nut_is_neither_screwed_on_again_nor_tightened():
     reasons = [world.execute(Subtask.parse(s)).reason for s in (*steps, "screw(Nut, Bolt)")]
     assert "turns without getting tighter" in reasons[1]
     assert reasons[5] == "the thread of Nut-1 is stripped"
-    assert world.spoiled() == {"Nut-1", "Bolt-1"}
+    assert {str(f) for f in world.history()} == {"stripped(Nut-1)", "stripped(Bolt-1)"}
 
 
 def test_a_bench_without_an_arm_changes_no_tool():

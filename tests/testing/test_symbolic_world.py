@@ -9,6 +9,7 @@ from forestall.testing.conformance import check_environment
 from forestall.testing.symbolic_scene import relation_at, start_scene
 from forestall.testing.symbolic_world import SymbolicWorld
 from forestall.types.episode import SkillStatus
+from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation
 from forestall.types.plan import Subtask
@@ -189,7 +190,9 @@ def test_histories_and_what_is_made_are_events():
     assert {n.id for n in world.truth().nodes} >= {"EggCracked-1"}
     assert ("made", ("Egg-1", "EggCracked-1")) in {(e.kind, e.objects) for e in world.events()}
     _run(world, "pick_up(Pan)", "put_on(Pan, StoveBurner-2)")
-    assert "EggCracked-1" in world.spoiled()  # the pan is dirty and the burner on
+    assert (
+        Literal("spoiled", ("EggCracked-1",)) in world.history()
+    )  # the pan is dirty and the burner on
     assert "spoiled" in {e.kind for e in world.events()}
 
 

@@ -118,14 +118,9 @@ class SymbolicWorld:
         """True attribute values of one instance, empty if there is no such instance now."""
         return {a: v for (n, a), v in self._state.values.items() if n == instance}
 
-    def spoiled(self) -> frozenset[str]:
-        """Things of which any history of the domain is true."""
-        return frozenset(f[1] for f in self._state.facts if self._is_history(f[0]) and len(f) > 1)
-
-    def histories(self) -> tuple[Literal, ...]:
-        """Every history that is true, sorted."""
-        found = (Literal(f[0], f[1:]) for f in self._state.facts if self._is_history(f[0]))
-        return tuple(sorted(found))
+    def history(self) -> frozenset[Literal]:
+        """History facts that hold: what has happened and cannot be undone."""
+        return frozenset(Literal(f[0], f[1:]) for f in self._state.facts if self._is_history(f[0]))
 
     def events(self) -> tuple[Event, ...]:
         """Everything that has happened since reset, in order."""
