@@ -1,6 +1,6 @@
 """A world of facts alone, for any domain: skills do what the domain's schemas say.
 
-Implements `Environment`, `OracleView` and `Disturbance`. Called by the loop, by tests and by anybody
+Implements `Environment`, `OracleView` and `Disturbance`. Called by the loop, by tests and by anyone
 with a domain and no simulator; calls the domain's own execution. There are no pictures: an
 observation holds the part of the state that is in view as a scene graph. What is inside something
 shut is not in view. Boxes are synthetic: things of one place stand side by side there.
