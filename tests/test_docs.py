@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from forestall.build import RunConfig, prepare
+from forestall.assembly.configuration import run_config
+from forestall.assembly.make import prepare
 from forestall.cli.main import app
 
 ROOT = Path(__file__).parent.parent
@@ -44,8 +45,8 @@ def test_the_example_files_are_valid(tmp_path: Path) -> None:
     task, attributes, scenario = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "task.toml").write_text(task)
     (tmp_path / "scenario.toml").write_text(scenario)
-    config = RunConfig(str(tmp_path / "task.toml"), str(tmp_path / "scenario.toml"))
+    config = run_config(str(tmp_path / "task.toml"), str(tmp_path / "scenario.toml"))
     assert prepare(config).loaded.task.name == "fetch-ladle"
     (tmp_path / "with-attribute.toml").write_text(task + attributes)
-    words = prepare(RunConfig(str(tmp_path / "with-attribute.toml"))).loaded.vocabulary
+    words = prepare(run_config(str(tmp_path / "with-attribute.toml"))).loaded.vocabulary
     assert words.phrases("Tomato", "ripe", "unripe") == ("an unripe tomato", "a green tomato")

@@ -10,10 +10,10 @@ from functools import cache
 
 import pytest
 
-from forestall.build import RunConfig
+from forestall.assembly.configuration import RunConfig, run_config
+from forestall.assembly.make import make_strategy
 from forestall.errors import PerceptionError
 from forestall.memory.recording import demonstration_from
-from forestall.parts import make_strategy
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.runtime import Runtime, RuntimeConfig
@@ -94,7 +94,7 @@ def memory() -> list[Demonstration]:
     found = []
     for task in task_names():
         for seed in range(1000, 1004):
-            config = RunConfig(task, strategy="none", seed=seed)
+            config = run_config(task, strategy="none", seed=seed)
             record = play(config, limits=RuntimeConfig(final_look=True))
             demonstration = demonstration_from(record, "test")
             assert demonstration is not None, (task, seed, record.failures)
@@ -118,12 +118,12 @@ def alarms(record: EpisodeRecord) -> list[BoundaryRecord]:
 
 @pytest.mark.parametrize("task", task_names())
 def test_undisturbed_runs_succeed_with_and_without_monitor(task: str) -> None:
-    plain = play(RunConfig(task, strategy="none", seed=5))
+    plain = play(run_config(task, strategy="none", seed=5))
     assert plain.success
     assert plain.end is EpisodeEnd.PLAN_FINISHED
     assert [e.subtask.skill for e in plain.executed] == [s.skill for s in plain.task.plan]
     for strategy in ("proactive", "online", "post-hoc", "watch"):
-        record = play(RunConfig(task, strategy=strategy, seed=5), memory())
+        record = play(run_config(task, strategy=strategy, seed=5), memory())
         assert record.success, strategy
         assert [e.subtask for e in record.executed] == [e.subtask for e in plain.executed]
         assert [
@@ -136,14 +136,14 @@ def test_undisturbed_runs_succeed_with_and_without_monitor(task: str) -> None:
 @pytest.mark.parametrize("scenario", ON_FLAT_WORLDS)
 def test_scenarios_fail_unwatched_and_succeed_watched(scenario: str) -> None:
     task = load_scenario(scenario).task
-    assert play(RunConfig(task, scenario, "none", seed=3)).success is False
-    watched = play(RunConfig(task, scenario, seed=3), memory())
+    assert play(run_config(task, scenario, strategy="none", seed=3)).success is False
+    watched = play(run_config(task, scenario, seed=3), memory())
     assert watched.success, watched.failures
     assert any(b.replan is not None and b.replan.plan is not None for b in watched.boundaries)
 
 
 def test_the_alarm_comes_before_the_subtask_and_names_the_cause() -> None:
-    record = play(RunConfig("heat-potato", "microwave-occupied", seed=3), memory())
+    record = play(run_config("heat-potato", "microwave-occupied", seed=3), memory())
     alarms = [
         b
         for b in record.boundaries
@@ -160,17 +160,17 @@ def test_the_alarm_comes_before_the_subtask_and_names_the_cause() -> None:
 
 
 def test_a_run_is_the_same_twice() -> None:
-    one, two = (play(RunConfig("cook-egg", "pan-dirty", seed=3), memory()) for _ in range(2))
+    one, two = (play(run_config("cook-egg", "pan-dirty", seed=3), memory()) for _ in range(2))
     assert [str(e.subtask) for e in one.executed] == [str(e.subtask) for e in two.executed]
     assert [b.graph for b in one.boundaries] == [b.graph for b in two.boundaries]
 
 
 def test_limits_end_an_episode() -> None:
-    short = play(RunConfig("make-salad", strategy="none"), limits=RuntimeConfig(max_subtasks=3))
+    short = play(run_config("make-salad", strategy="none"), limits=RuntimeConfig(max_subtasks=3))
     assert short.end is EpisodeEnd.SUBTASK_LIMIT
     assert len(short.executed) == 3
     never = play(
-        RunConfig("heat-potato", "microwave-left-closed", seed=3),
+        run_config("heat-potato", "microwave-left-closed", seed=3),
         memory(),
         RuntimeConfig(max_replans=0),
     )
@@ -190,7 +190,7 @@ def test_an_error_in_the_middle_is_recorded() -> None:
 
     loaded = load_task("make-coffee")
     kitchen = flat_environment(loaded.task.scene, loaded.vocabulary)
-    config = RunConfig("make-coffee", strategy="none")
+    config = run_config("make-coffee", strategy="none")
     strategy = make_strategy(config, loaded.vocabulary, None)
     runtime = Runtime(kitchen, Broken(kitchen, loaded.vocabulary), strategy, loaded.vocabulary)
     record = runtime.run(loaded.task, loaded.task.plan, 0)
@@ -218,7 +218,7 @@ class Forgetful(TruthPerceiver):
 
 
 def test_a_lost_thing_is_looked_for_and_then_the_run_stops_safely() -> None:
-    record = play(RunConfig("make-coffee", "mug-dropped", seed=3), memory(), perceiver=Forgetful)
+    record = play(run_config("make-coffee", "mug-dropped", seed=3), memory(), perceiver=Forgetful)
     assert record.end is EpisodeEnd.STOPPED
     assert record.success is False
     first, second = record.boundaries[-2:]
@@ -232,7 +232,7 @@ def test_a_lost_thing_is_looked_for_and_then_the_run_stops_safely() -> None:
 
 def test_without_a_near_reference_nothing_is_claimed() -> None:
     others = [d for d in memory() if d.task == "switch-devices"]
-    record = play(RunConfig("make-coffee", seed=3), others)
+    record = play(run_config("make-coffee", seed=3), others)
     assert record.success
     assert all(b.verdict is not None and b.verdict.score is None for b in record.boundaries)
     assert all("nothing was judged" in b.verdict.note for b in record.boundaries if b.verdict)
@@ -260,7 +260,7 @@ class Counting(TruthPerceiver):
 )
 def test_only_who_looks_after_pays_for_it(strategy: str, final_look: bool, looks: int) -> None:
     Counting.looks = 0
-    config = RunConfig("switch-devices", strategy=strategy, seed=5)
+    config = run_config("switch-devices", strategy=strategy, seed=5)
     record = play(config, memory(), RuntimeConfig(final_look=final_look), Counting)
     assert len(record.initial_plan) == 10
     assert Counting.looks == looks
@@ -268,7 +268,7 @@ def test_only_who_looks_after_pays_for_it(strategy: str, final_look: bool, looks
 
 
 def test_a_moment_after_a_subtask_shares_its_index_and_the_end_has_its_own() -> None:
-    record = play(RunConfig("switch-devices", strategy="online", seed=5), memory())
+    record = play(run_config("switch-devices", strategy="online", seed=5), memory())
     whens = [(b.index, b.when) for b in record.boundaries]
     both = [(i, when) for i in range(10) for when in (When.BEFORE, When.AFTER)]
     assert whens == [*both, (10, When.END)]
@@ -308,7 +308,7 @@ IRREVERSIBLE = {
 def test_what_cannot_be_undone_must_be_seen_before_it_is_done(scenario: str) -> None:
     task = load_scenario(scenario).task
     ahead, online, late = (
-        play(RunConfig(task, scenario, strategy, seed=3), memory())
+        play(run_config(task, scenario, strategy=strategy, seed=3), memory())
         for strategy in ("proactive", "online", "post-hoc")
     )
     assert ahead.success
@@ -333,7 +333,7 @@ def test_what_can_be_undone_is_recovered_later(
 ) -> None:
     task = load_scenario(scenario).task
     ahead, online, late = (
-        play(RunConfig(task, scenario, strategy, seed=3), memory())
+        play(run_config(task, scenario, strategy=strategy, seed=3), memory())
         for strategy in ("proactive", "online", "post-hoc")
     )
     assert ahead.success and online.success and late.success
@@ -349,7 +349,7 @@ def test_what_can_be_undone_is_recovered_later(
 
 def test_watching_changes_nothing_and_names_what_is_wrong() -> None:
     plain, watched = (
-        play(RunConfig("heat-potato", "microwave-occupied", strategy, seed=3), memory())
+        play(run_config("heat-potato", "microwave-occupied", strategy=strategy, seed=3), memory())
         for strategy in ("none", "watch")
     )
     assert [e.subtask for e in watched.executed] == [e.subtask for e in plain.executed]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forestall.build import RunConfig
+from forestall.assembly.configuration import run_config
 from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import ScoreConfig
 from forestall.comparison.preconditions import mine
@@ -188,13 +188,13 @@ def test_a_run_names_it_as_the_cause(task: str, tmp_path: Path) -> None:
     scenario.write_text(SCENARIO, encoding="utf-8")
     memory: list[Demonstration] = []
     for seed in range(1000, 1004):
-        demonstration = demonstration_from(play(RunConfig(task, strategy="none", seed=seed)), "t")
+        demonstration = demonstration_from(play(run_config(task, strategy="none", seed=seed)), "t")
         assert demonstration is not None
         memory.append(replace(demonstration, id=f"d{seed}"))
-    calm = play(RunConfig(task, seed=2), memory)
+    calm = play(run_config(task, seed=2), memory)
     assert calm.success
     assert all(b.verdict and b.verdict.decision is Decision.PROCEED for b in calm.boundaries)
-    alarmed = play(RunConfig(task, str(scenario), seed=2), memory)
+    alarmed = play(run_config(task, str(scenario), seed=2), memory)
     assert alarmed.success is False
     first = next(b for b in alarmed.boundaries if b.diagnosis is not None)
     assert first.diagnosis is not None and first.replan is not None

@@ -12,7 +12,8 @@ PRESENTATION = ("cli", "report", "training", "experiments")
 """Packages that show results or train models, and change no run."""
 
 ROW_MAKING = (
-    "experiments/conduct.py", "experiments/runs.py", "experiments/worker.py", "records/derived.py",
+    "experiments/conduct.py", "experiments/runs.py", "experiments/speed.py",
+    "experiments/worker.py", "records/derived.py",
 )  # fmt: skip
 """What makes the rows of an experiment from its runs all the same."""
 

@@ -1,13 +1,14 @@
 """Every Protocol of the project; implementations never import each other.
 
-Calls point downwards: a command builds a runtime (`build.py`), its monitor calls the strategy, the
-strategy calls detector, reasoner, replanner; all of them see only this file and `types/`.
+Calls point downwards: a command has a runtime built (`assembly/`), its monitor calls
+the strategy, the strategy calls detector, reasoner, replanner; all see only this and `types/`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from contextlib import AbstractContextManager
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,11 +25,16 @@ from forestall.types.episode import (
 )
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
+from forestall.types.kind import Kind
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
+from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
+from forestall.types.world import Working
+
+T = TypeVar("T")
 
 
 class Environment(Protocol):
@@ -84,6 +90,69 @@ class Disturbance(Protocol):
 
         A hard fall breaks what is fragile.
         """
+
+
+class OpenWorld(Protocol):
+    """One world made for one run, seen from its three sides."""
+
+    @property
+    def environment(self) -> Environment:
+        """What the robot looks at and acts in."""
+
+    @property
+    def oracle(self) -> OracleView:
+        """The truth, for the oracle's states, the scorer and the trace of an experiment alone."""
+
+    @property
+    def disturbance(self) -> Disturbance:
+        """What the scenario's faults may do."""
+
+
+class WorldPart(Protocol):
+    """Makes worlds of one sort: the part of a run that stands for robot and surroundings."""
+
+    name: str
+
+    def open(
+        self, needs: SceneNeeds, domain: Domain, remember: bool = False
+    ) -> AbstractContextManager[OpenWorld]:
+        """A world with what is needed in it, freed at the end.
+
+        `remember`: many runs follow, and what one of them drew may serve another.
+        """
+
+    def check(self) -> Sequence[Working]:
+        """What of it works on this machine."""
+
+
+class Parts(Protocol):
+    """What a part may borrow while it is built: its factory's first argument, called `parts`."""
+
+    @property
+    def domain(self) -> Domain:
+        """Categories, predicates and skills of the run's domain."""
+
+    @property
+    def demonstrations(self) -> Sequence[Demonstration]:
+        """The memory; InputError where there is none."""
+
+    def part(self, kind: Kind[T], name: str | None = None, **options: Any) -> T:
+        """The run's part of a kind, or one of another name with these options."""
+
+    def name(self, kind: Kind[Any]) -> str:
+        """What the run's part of a kind is called."""
+
+    def options(self, kind: Kind[Any]) -> Mapping[str, Any]:
+        """Its options, given and defaulted."""
+
+    def given(self, kind: Kind[Any]) -> Mapping[str, Any]:
+        """Those that were given."""
+
+    def declared(self, kind: Kind[Any], name: str | None = None) -> Sequence[str]:
+        """Every name of a kind; or every option of one part of it."""
+
+    def lent(self, what: str) -> Any:
+        """Something of this very run: "truth", "states"; InputError where there is none."""
 
 
 class World(Protocol):
@@ -215,6 +284,12 @@ class DemonstrationStore(Protocol):
 
     def all(self) -> Sequence[Demonstration]:
         """Every demonstration in id order (graphs loaded, images by reference)."""
+
+    def required(self) -> Sequence[Demonstration]:
+        """As `all`; MemoryFileError where there is none."""
+
+    def close(self) -> None:
+        """Free what the store holds."""
 
 
 class Retriever(Protocol):

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forestall.build import RunConfig, prepare
+from forestall.assembly.configuration import run_config
+from forestall.assembly.make import make_strategy, prepare
+from forestall.assembly.parts import Assembly
 from forestall.cli.main import call
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.errors import InputError, UnknownNameError
-from forestall.parts import make_image_encoder, make_state_estimator, make_strategy
+from forestall.kinds import IMAGE_ENCODER, STATES
 from forestall.training import shards
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import ObjectNode, SceneGraph
@@ -68,7 +70,7 @@ def test_figures_tables_and_page_of_the_shipped_encoder(
     ("change", "message"),
     [
         ({"states": "given"}, "states of a run 'given'.*learned"),
-        ({"feature": "pixels"}, "node feature 'pixels'.*image"),
+        ({"feature": "pixels"}, "feature of the perceiver 'graph' 'pixels'.*image"),
         ({"encoder": "word2vec"}, "encoder 'word2vec'.*two-tower"),
     ],
 )
@@ -76,20 +78,21 @@ def test_unknown_names_are_refused_before_anything_is_built(
     change: dict[str, str], message: str
 ) -> None:
     with pytest.raises(UnknownNameError, match=message):
-        prepare(RunConfig("heat-potato", **change))
+        prepare(run_config("heat-potato", **change))
 
 
 def test_states_are_learned_when_nothing_is_said() -> None:
-    assert RunConfig("heat-potato").states == "learned"
-    name = make_state_estimator("learned", household()).name
-    assert name == f"learned states ({TwoTowerEncoder().name})"
-    assert make_image_encoder("two-tower") is make_image_encoder("two-tower")
+    config = run_config("heat-potato")
+    assert config.choice(STATES).name == "learned"
+    one, two = (Assembly(config.choices, household()) for _ in range(2))
+    assert one.part(STATES).name == f"learned states ({TwoTowerEncoder().name})"
+    assert one.part(IMAGE_ENCODER) is two.part(IMAGE_ENCODER)  # read once for each process
 
 
 def test_a_memory_without_looks_is_refused_for_the_feature_image() -> None:
     subtask = Subtask.parse("pick_up(Potato)")
     graph = SceneGraph((ObjectNode("Potato-1", "Potato"),), subtask=subtask)
     step = DemonstrationStep(0, subtask, graph, graph)
-    config = RunConfig("heat-potato", feature="image")
+    config = run_config("heat-potato", feature="image")
     with pytest.raises(InputError, match=r"node features of demonstration .* come from nothing"):
         make_strategy(config, household(), [Demonstration("heat-potato", "kitchen-1", 1, (step,))])

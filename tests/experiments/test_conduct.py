@@ -12,9 +12,10 @@ from typing import IO, Any
 import pytest
 
 from experiments.episodes import DEADLY, computed_row, deadly_row
+from forestall.assembly.configuration import Given
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
-from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder
+from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder, episodes_in
 from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
 from forestall.statistics.cases import CASE_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
@@ -113,7 +114,7 @@ def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> N
     with pytest.raises(InputError, match="split"):
         play(replace(SMALL, choice=Choice("proactive", limit=2)), tmp_path)
     with pytest.raises(InputError, match="states"):
-        play(replace(SMALL, settings=Settings(states="oracle")), tmp_path)
+        play(replace(SMALL, settings=Settings(Given.named({"states": "oracle"}))), tmp_path)
     about = json.loads((tmp_path / ABOUT).read_text())
     (tmp_path / ABOUT).write_text(json.dumps(about | {"version": "0.0.1"}))
     with pytest.raises(InputError, match=r"version '0\.0\.1'"):
@@ -122,7 +123,7 @@ def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> N
 
 def test_two_commands_do_not_write_to_one_folder(tmp_path: Path) -> None:
     play(SMALL, tmp_path)
-    with ResultsFolder(tmp_path).alone(), pytest.raises(InputError, match="another experiment"):
+    with episodes_in(tmp_path).alone(), pytest.raises(InputError, match="another experiment"):
         play(SMALL, tmp_path)
 
 
@@ -131,7 +132,7 @@ def test_reading_while_another_writes_takes_nothing_away(tmp_path: Path) -> None
     with (tmp_path / ROWS).open("a") as lines:
         lines.write('{"format": 1, "set"')
     before = (tmp_path / ROWS).read_bytes()
-    assert len(ResultsFolder(tmp_path).rows()) == len(runs_for(SMALL.choice))
+    assert len(episodes_in(tmp_path).rows()) == len(runs_for(SMALL.choice))
     assert (tmp_path / ROWS).read_bytes() == before
 
 
@@ -140,10 +141,10 @@ def test_reading_while_another_writes_takes_nothing_away(tmp_path: Path) -> None
     [
         ({"workers": 0}, "jobs"),
         ({"engine": "slurm"}, "local, ray"),
-        ({"settings": Settings(states="learnd")}, "did you mean learned"),
-        ({"settings": Settings(encoder="words")}, "hashed-words"),
+        ({"settings": Settings(Given.named({"states": "learnd"}))}, "did you mean learned"),
+        ({"settings": Settings(Given.named({"encoder": "words"}))}, "hashed-words"),
         ({"settings": Settings(pages="every")}, "telling"),
-        ({"settings": Settings(memory="nowhere.db")}, "nowhere.db"),
+        ({"settings": Settings(Given.named({"memory": "nowhere.db"}))}, "nowhere.db"),
     ],
 )
 def test_what_cannot_be_is_said_before_anything_is_run(

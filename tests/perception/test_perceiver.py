@@ -19,7 +19,6 @@ from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
 from forestall.perception.support import parents
 from forestall.perception.timing import perception_times
 from forestall.perception.unproject import clouds, label_image
-from forestall.registry import load
 from forestall.seams import Perceiver, Segmenter, StateEstimator
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
@@ -62,19 +61,6 @@ def test_the_parts_fulfil_their_protocols() -> None:
         "state_estimator": "oracle states",
     }
     assert other.name == "given masks"
-
-
-@pytest.mark.parametrize(
-    ("kind", "name", "cls"),
-    [
-        ("segmenter", "instance-ids", InstanceSegmenter),
-        ("segmenter", "given-masks", GivenMasks),
-        ("states", "oracle", OracleStateEstimator),
-        ("states", "given", GivenStateEstimator),
-    ],
-)
-def test_the_parts_can_be_chosen_by_name(kind: str, name: str, cls: type) -> None:
-    assert load(kind, name) is cls
 
 
 @settings(max_examples=8, deadline=None)

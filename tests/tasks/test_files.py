@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from forestall.build import RunConfig, prepare
+from forestall.assembly.configuration import run_config
+from forestall.assembly.make import prepare
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.tasks.files import (
     load_scenario,
@@ -236,7 +237,7 @@ def test_what_a_scenario_names_is_checked_before_anything_runs(
     head = 'name = "own"\ntask = "make-coffee"\ntitle = "t"\nkind = "drop"\ncause = "c"\n'
     path.write_text(f"{head}[[faults]]\n{fault}\n")
     with pytest.raises(InputError, match=says):
-        prepare(RunConfig("make-coffee", str(path)))
+        prepare(run_config("make-coffee", str(path)))
 
 
 def test_moments_that_the_plan_has_not_are_refused_before_anything_runs(tmp_path: Path) -> None:
@@ -258,8 +259,8 @@ value = "dirty"
     for effect, what in (("pick_up(Mug)", "0 time"), ("pick_up(Plate) #3", "2 time")):
         path.write_text(text.format(effect=effect))
         with pytest.raises(InputError, match=what):
-            prepare(RunConfig("heat-potato", str(path)))
+            prepare(run_config("heat-potato", str(path)))
     path.write_text(text.format(effect="pick_up(Plate) #2"))
-    prepared = prepare(RunConfig("heat-potato", str(path)))
+    prepared = prepare(run_config("heat-potato", str(path)))
     assert prepared.scenario is not None
     assert prepared.scenario.moments(prepared.plan) == (0, 7)

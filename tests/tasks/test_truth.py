@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from forestall.parts import RunConfig, make_strategy
+from forestall.assembly.configuration import run_config
+from forestall.assembly.make import make_strategy
 from forestall.runtime import Runtime
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.tasks.files import load_scenario, load_task, task_names
@@ -24,7 +25,7 @@ def traced(task: str, scenario: str | None, seed: int = 4) -> list[TrueMoment]:
     Runtime(
         wrap(kitchen, faults, kitchen, loaded.vocabulary),
         TruthPerceiver(kitchen, loaded.vocabulary),
-        make_strategy(RunConfig(task, strategy="none"), loaded.vocabulary, None),
+        make_strategy(run_config(task, strategy="none"), loaded.vocabulary, None),
         loaded.vocabulary,
         [trace],
     ).run(loaded.task, apply_plan_faults(loaded.task.plan, faults), seed)

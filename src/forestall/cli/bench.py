@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from forestall.cli.flags import ComparingFlags
+
 Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+DEFAULTS = ComparingFlags()
 
 bench = App(name="bench", help="Measure.")
 
@@ -17,8 +22,9 @@ bench = App(name="bench", help="Measure.")
 @bench.command
 def speed(
     *,
-    repeat: int = 10,
+    repeat: int | None = None,
     seed: int = 0,
+    out: Path | None = None,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -27,17 +33,21 @@ def speed(
     Args:
         repeat: how often each is timed (the episode: once with each strategy).
         seed: of the scene.
+        out: folder of the results; what is finished in it is not timed again. A new one under
+            runs/ by default.
         as_json: print JSON instead of the table.
         quiet: no progress on standard error.
     """
     from forestall.cli.progress import bar
     from forestall.errors import InputError
-    from forestall.speed import measure
+    from forestall.experiments.speed import REPEAT, measure
 
+    repeat = REPEAT if repeat is None else repeat
     if repeat < 1:
         raise InputError(f"--repeat {repeat}: at least 1 is needed")
+    folder = out or Path("runs") / f"speed-{time.strftime('%Y%m%d-%H%M%S')}"
     with bar("measuring", quiet=quiet or as_json) as feed:
-        report = measure(repeat, seed, feed)
+        report = measure(repeat, seed, folder, feed)
     if as_json:
         print(json.dumps(report, indent=2))
         return 0
@@ -69,13 +79,10 @@ def episodes(
     task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     scenario: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     strategy: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
-    seeds: str = "100:105",
-    memory: Path | None = None,
-    states: str = "learned",
-    feature: str = "parts",
-    encoder: str = "hashed-words",
+    seeds: str | None = None,
     jobs: int | None = None,
-    out: Path = Path("runs/episodes.jsonl"),
+    out: Path | None = None,
+    parts: ComparingFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -87,38 +94,44 @@ def episodes(
             shipped one; none by default.
         strategy: strategies; none and proactive by default.
         seeds: scenes, e.g. 100:120 for 100 to 119.
-        memory: a demonstration file; the ready-made one of each task by default.
-        states: where object states come from: learned, clip or oracle.
-        feature: what a node's feature encodes: text, parts or image.
-        encoder: of texts: hashed-words, two-tower, sentence.
         jobs: how many processes; all cores by default.
-        out: results, one JSON line each; what is in it already is not run again.
+        out: folder of the results; what is finished in it is not run again. By default one under
+            runs/ that only the same settings, code and memory share.
+        parts: which parts.
         as_json: print JSON instead of the table.
         quiet: no progress on standard error.
     """
     from forestall.cli.progress import bar
     from forestall.errors import InputError
-    from forestall.survey import jobs_for, parse_seeds, survey, table
+    from forestall.experiments.conduct import Experiment
+    from forestall.experiments.episodes import (
+        KIND,
+        SEEDS,
+        STRATEGIES,
+        Episodes,
+        count,
+        folder_for,
+        parse_seeds,
+    )
+    from forestall.experiments.runs import Settings
     from forestall.tasks.files import SETS, scenario_names, task_names
 
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs {jobs}: at least 1 is needed")
     of_sets = {"all": scenario_names(), **{of: scenario_names(of) for of in SETS}}
     scenarios = [s for name in scenario or [] for s in of_sets.get(name, (name,))]
     tasks = task or ([] if scenarios else list(task_names()))
-    todo = jobs_for(
-        tasks,
-        scenarios,
-        strategy or ["none", "proactive"],
-        parse_seeds(seeds),
-        None if memory is None else str(memory),
-        states,
-        feature,
-        encoder,
+    seeds = seeds or SEEDS
+    chosen = Episodes(
+        tuple(tasks), tuple(scenarios), tuple(strategy or STRATEGIES), tuple(parse_seeds(seeds))
     )
+    workers = jobs if jobs is not None else os.cpu_count() or 1
+    if workers < 1:
+        raise InputError(f"--jobs {workers}: at least 1 is needed")
+    settings = Settings(parts.given(), pages="none")
+    experiment = Experiment(chosen, workers, settings=settings, kind=KIND)
+    folder = folder_for(experiment, out)
     with bar("running", quiet=quiet or as_json) as feed:
-        rows = survey(todo, jobs or os.cpu_count() or 1, out, feed)
-    lines = table(rows)
+        lines = count(experiment, folder, feed)
+    states = next(p.name for p in settings.parts() if p.kind == "states")
     if as_json:
         print(json.dumps({"seeds": seeds, "states": states, "rows": lines}, indent=2))
         return 0
@@ -139,5 +152,5 @@ def episodes(
             for r in lines
         ],
     )
-    print(f"seeds {seeds}, states: {states}, results in {out}")
+    print(f"seeds {seeds}, states: {states}, results in {folder}")
     return 0

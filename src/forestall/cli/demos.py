@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from forestall.cli.flags import SeeingFlags
+
 if TYPE_CHECKING:
+    from forestall.assembly.configuration import RunConfig
     from forestall.types.demonstration import Demonstration
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Quiet = Annotated[bool, Parameter(negative="")]
+
+DEFAULTS = SeeingFlags()
 
 demos = App(name="demos", help="Record and list demonstrations.")
 
@@ -25,12 +30,9 @@ def record(
     /,
     *,
     task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
-    kitchens: int = 4,
-    seed: int = 1_000_000,
-    states: str = "learned",
-    feature: str = "parts",
-    image_encoder: str = "two-tower",
-    captioner: str = "listing",
+    kitchens: int | None = None,
+    seed: int | None = None,
+    parts: SeeingFlags = DEFAULTS,
     jobs: int | None = None,
     quiet: Quiet = False,
 ) -> int:
@@ -39,21 +41,21 @@ def record(
     Args:
         memory: the demonstration file to add to; made when it does not exist.
         task: task names or files; all shipped tasks by default.
-        kitchens: demonstrations per task.
+        kitchens: demonstrations per task; as many as the paper has by default.
         seed: first seed of the demonstration scenes.
-        states: where object states come from: learned, clip or oracle.
-        feature: "image" keeps the look of every object, for runs with --feature image.
-        image_encoder: of whole pictures, for the detector image: two-tower or clip.
-        captioner: of whole pictures, for the detector caption: listing or blip.
+        parts: which parts; the feature "image" keeps the look of every object.
         jobs: how many processes; all cores by default.
         quiet: no progress bar.
     """
+    from forestall.assembly.demonstrations import KITCHENS_PER_TASK, jobs_for, record_all
     from forestall.cli.progress import bar
-    from forestall.demonstrations import jobs_for, record_all
+    from forestall.config import DEMONSTRATION_SEEDS
     from forestall.errors import InputError
     from forestall.memory.store import open_store
     from forestall.tasks.files import load_task, task_names
 
+    kitchens = KITCHENS_PER_TASK if kitchens is None else kitchens
+    first = DEMONSTRATION_SEEDS if seed is None else seed
     if kitchens < 1:
         raise InputError(f"--kitchens {kitchens}: at least 1 is needed")
     if jobs is not None and jobs < 1:
@@ -61,7 +63,9 @@ def record(
     names = task or list(task_names())
     for name in names:
         load_task(name)
-    todo = jobs_for(names, kitchens, seed, states, feature, image_encoder, captioner)
+    todo = jobs_for(names, kitchens, first, parts.given())
+    for job in todo[:1]:
+        job.config(first)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:
         count = 0
         for demonstration in record_all(todo, jobs or os.cpu_count() or 1, feed):
@@ -137,52 +141,23 @@ def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
     return 0
 
 
-def load_memory(
-    memory: Path | None,
-    task: str,
-    states: str,
-    quiet: bool,
-    feature: str = "parts",
-    image_encoder: str = "two-tower",
-    captioner: str = "listing",
-) -> tuple[list[Demonstration], str]:
-    """Every demonstration of a memory, and its path.
+def memory_of(config: RunConfig, quiet: bool) -> tuple[list[Demonstration], str]:
+    """Every demonstration that a run compares with, and where they come from.
 
     Args:
-        memory: a demonstration file; None for the ready-made one of the task.
-        task: name or file.
-        states: where object states come from.
+        config: of the run.
         quiet: no progress on standard error.
-        feature: what a node's feature encodes.
-        image_encoder: of whole pictures.
-        captioner: of whole pictures.
 
     Raises:
         MemoryFileError: see `memory.store`.
     """
-    from forestall.memory.store import open_store
-
-    path = memory or _ready_made(task, states, quiet, feature, image_encoder, captioner)
-    with open_store(path) as store:
-        return list(store.required()), str(path)
-
-
-def _ready_made(
-    task: str, states: str, quiet: bool, feature: str, image_encoder: str, captioner: str
-) -> Path:
+    from forestall.assembly.demonstrations import load_memory, memory_path, ready_made
     from forestall.cli.progress import bar
-    from forestall.demonstrations import ready_made
 
     def announce(text: str) -> None:
         print(f"forestall: {text}", file=sys.stderr)
 
-    with bar("recording", quiet=quiet) as feed:
-        return ready_made(
-            task,
-            states,
-            announce,
-            feed,
-            feature=feature,
-            image_encoder=image_encoder,
-            captioner=captioner,
-        )
+    if memory_path(config) is None:
+        with bar("recording", quiet=quiet) as feed:
+            ready_made(config, announce, feed)
+    return load_memory(config)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from importlib.util import find_spec
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from forestall.types.world import Working
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 
@@ -50,19 +54,9 @@ def _needed() -> list[dict[str, Any]]:
     from forestall.config import cache_dir
     from forestall.errors import ForestallError
     from forestall.memory.store import open_store
-    from forestall.worlds.kitchen.rendering.probe import probe_renderers
 
-    probes = {p.name: p for p in probe_renderers()}
-    picture = [p for n, p in probes.items() if n != "gl" and p.works]
-    rows = [
-        _row(
-            "picture without a graphics library",
-            bool(picture),
-            True,
-            ", ".join(f"{p.name} ({p.detail})" for p in picture) or "no software renderer works",
-            "pip install --force-reinstall embreex mujoco-core",
-        )
-    ]
+    of_world = [_row(w.what, w.works, w.needed, w.detail, w.hint) for w in _world()]
+    rows = [r for r in of_world if r["needed"]]
     with tempfile.TemporaryDirectory() as folder:
         try:
             with open_store(Path(folder) / "probe.db", create=True):
@@ -75,11 +69,18 @@ def _needed() -> list[dict[str, Any]]:
     rows.append(
         _row("cache folder", folder_ok, True, detail, "set FORESTALL_CACHE to a writable folder")
     )
-    for name in ("embree", "rays", "gl"):
-        if name in probes:
-            p = probes[name]
-            rows.append(_row(f"renderer {name}", p.works, False, p.detail, p.hint))
+    rows += [r for r in of_world if not r["needed"]]
     return rows
+
+
+def _world() -> Sequence[Working]:
+    """What the world of the shipped tasks says of this machine."""
+    from forestall.assembly.configuration import run_config
+    from forestall.assembly.make import make_world
+    from forestall.tasks.files import load_task, task_names
+
+    name = task_names()[0]
+    return make_world(run_config(name), load_task(name).domain).check()
 
 
 def _encoder() -> dict[str, Any]:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from forestall.cli.flags import ComparingFlags
+
 if TYPE_CHECKING:
     from forestall.statistics.tables import Table
 
@@ -36,12 +38,6 @@ class Options:
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes) or ray.
         address: of a running Ray cluster; a local one is started by default.
-        memory: a demonstration file; the ready-made one of each task by default.
-        states: where object states come from: learned, clip or oracle.
-        feature: what a node's feature encodes: text, parts or image.
-        encoder: of texts: hashed-words, two-tower, sentence.
-        image_encoder: of whole pictures, for the detector image: two-tower or clip.
-        captioner: of whole pictures, for the detector caption: listing or blip.
         pages: which episodes get a page of their own (1.5 MB each): all, telling (the proactive
             runs of failing cases, and those with a false alarm) or none.
         as_json: print the summary as JSON instead of tables.
@@ -57,38 +53,33 @@ class Options:
     out: Path | None = None
     engine: str = "local"
     address: str | None = None
-    memory: Path | None = None
-    states: str = "learned"
-    feature: str = "parts"
-    encoder: str = "hashed-words"
-    image_encoder: str = "two-tower"
-    captioner: str = "listing"
     pages: str = "telling"
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
     quiet: Flag = False
 
 
 DEFAULTS = Options()
+PARTS = ComparingFlags()
 
 
-def proactive(*, options: Options = DEFAULTS) -> int:
+def proactive(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
     """The paper's Table 1: success and time of none, post-hoc, online and proactive."""
-    return _experiment("proactive", options)
+    return _experiment("proactive", options, parts)
 
 
-def detection(*, options: Options = DEFAULTS) -> int:
+def detection(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
     """The paper's Fig. 8a: what detectors find, how early, and how often they cry wolf."""
-    return _experiment("detection", options)
+    return _experiment("detection", options, parts)
 
 
-def ablation(*, options: Options = DEFAULTS) -> int:
+def ablation(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
     """The paper's Table 2: the score without its parts, replanning without reasoning."""
-    return _experiment("ablation", options)
+    return _experiment("ablation", options, parts)
 
 
-def everything(*, options: Options = DEFAULTS) -> int:
+def everything(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
     """All of them, on one set of episodes."""
-    return _experiment("all", options)
+    return _experiment("all", options, parts)
 
 
 def report(
@@ -115,7 +106,7 @@ def register(bench: App) -> None:
     bench.command(everything, name="all")
 
 
-def _experiment(name: str, options: Options) -> int:
+def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
     from forestall.cli.progress import bar
     from forestall.experiments.conduct import Experiment, conduct
     from forestall.experiments.results import present
@@ -133,15 +124,7 @@ def _experiment(name: str, options: Options) -> int:
         options.jobs if options.jobs is not None else os.cpu_count() or 1,
         options.engine,
         options.address,
-        Settings(
-            states=options.states,
-            encoder=options.encoder,
-            feature=options.feature,
-            image_encoder=options.image_encoder,
-            captioner=options.captioner,
-            memory=None if options.memory is None else str(options.memory),
-            pages=options.pages,
-        ),
+        Settings(parts.given(), pages=options.pages),
     )
     out = options.out or Path("runs") / f"{name}-{options.split}"
     with bar("running", quiet=options.quiet or options.as_json) as feed:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from forestall.cli.flags import RunFlags, Settings
 from forestall.config import DEFAULT_DOMAIN
 
 if TYPE_CHECKING:
@@ -93,8 +94,10 @@ def check(
     subtask: str,
     task: str | None = None,
     memory: Path | None = None,
-    threshold: float = 0.9,
-    states: str = "given",
+    threshold: float | None = None,
+    states: str | None = None,
+    config: Path | None = None,
+    settings: Settings = None,
     as_json: Json = False,
 ) -> int:
     """Judge a stored observation of your own before a subtask.
@@ -109,20 +112,30 @@ def check(
         memory: a demonstration file; the ready-made one of the task by default.
         threshold: alarm when no demonstration reaches this score.
         states: given (as the folder says), or read off its pictures: learned, clip.
+        config: a TOML file with a table for each kind of part; flags come over it.
+        settings: one option of a part; --detector.threshold 0.85 is short for
+            --set detector.threshold=0.85.
         as_json: print JSON.
     """
-    from forestall.cli.demos import load_memory
+    from forestall.assembly.checking import judge_stored
+    from forestall.assembly.configuration import Given, run_config
+    from forestall.assembly.demonstrations import memory_path
+    from forestall.cli.demos import memory_of
     from forestall.errors import InputError
-    from forestall.stored import judge_stored
+    from forestall.kinds import STATES
     from forestall.types.verdict import Decision
 
-    if memory is None and task is None:
-        raise InputError("give --memory FILE, or --task NAME to compare with its ready-made memory")
-    demonstrations, path = load_memory(memory, task or "", "learned", as_json)
-    started = time.perf_counter()
-    graph, verdict, diagnosis = judge_stored(
-        folder, subtask, task, demonstrations, threshold, states
+    flags = RunFlags(
+        threshold=threshold, states=states, memory=memory, config=config, settings=settings
     )
+    given = flags.given()
+    remembering = Given(tuple(part for part in given.parts if part[0] != STATES.name))
+    wanted = run_config(task or "", given=remembering)
+    if task is None and memory_path(wanted) is None:
+        raise InputError("give --memory FILE, or --task NAME to compare with its ready-made memory")
+    demonstrations, path = memory_of(wanted, as_json)
+    started = time.perf_counter()
+    graph, verdict, diagnosis = judge_stored(folder, subtask, task, demonstrations, given)
     data = _verdict_json(verdict, diagnosis) | {
         "subtask": str(graph.subtask),
         "memory": path,
@@ -135,7 +148,9 @@ def check(
         judged = "not judged" if verdict.score is None else verdict.decision.value
         print(f"{judged}: before {graph.subtask}")
         score = "none" if verdict.score is None else f"{verdict.score:.3f}"
-        print(f"  score {score}, threshold {threshold:.2f}, {verdict.references} references")
+        print(
+            f"  score {score}, threshold {verdict.threshold:.2f}, {verdict.references} references"
+        )
         if verdict.note:
             print(f"  {verdict.note}")
         for d in verdict.discrepancies:

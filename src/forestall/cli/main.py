@@ -19,9 +19,11 @@ from forestall.cli.bench import bench
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
 from forestall.cli.encoder import encoder
+from forestall.cli.flags import spelt
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
+from forestall.cli.parts import parts
 from forestall.cli.run import run
 from forestall.errors import ForestallError, InputError
 
@@ -31,7 +33,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, page, tasks, scenarios, check, compare, doctor):
+for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
     app.command(command)
 app.command(demos)
 app.command(bench)
@@ -46,8 +48,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def call(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; errors are one line on standard error."""
+    given = sys.argv[1:] if arguments is None else arguments
     try:
-        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        code = app(
+            list(spelt(given)), exit_on_error=False, print_error=False, result_action="return_value"
+        )
     except cyclopts.CycloptsError as error:
         return _fail(" ".join(str(error).split()), 2)
     except InputError as error:

@@ -6,15 +6,16 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-if TYPE_CHECKING:
-    from forestall.build import RunConfig
-    from forestall.types.demonstration import Demonstration
+from forestall.cli.demos import memory_of
+from forestall.cli.flags import RunFlags
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+DEFAULTS = RunFlags()
 
 
 def run(
@@ -22,71 +23,43 @@ def run(
     /,
     *,
     scenario: str | None = None,
-    strategy: str = "proactive",
-    seed: int = 0,
-    out: Path | None = None,
-    memory: Path | None = None,
-    states: str = "learned",
-    feature: str = "parts",
-    encoder: str = "hashed-words",
-    renderer: str = "auto",
-    threshold: float = 0.9,
-    detector: str = "scene-graph",
+    seed: int | None = None,
     without: str | None = None,
-    image_encoder: str = "two-tower",
-    captioner: str = "listing",
+    out: Path | None = None,
+    parts: RunFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Run one household task from pixels to a plan that works, and write a page about it.
+    """Run one task from pixels to a plan that works, and write a page about it.
 
     Args:
         task: a task's name (see `forestall tasks`) or a task file.
         scenario: what goes wrong (see `forestall scenarios`), or a scenario file.
-        strategy: when a run may be interrupted: none, proactive, online,
-            online-scene, post-hoc; watch lets every detector judge and never interrupts.
         seed: of the scene.
-        out: folder for the record, its pictures and the page; a new one under runs/ by default.
-        memory: a demonstration file; the ready-made one by default.
-        states: where object states come from: learned (pixels, by the shipped encoder), clip
-            (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
-        feature: what a node's feature encodes: text, parts (category and states) or image.
-        encoder: of texts, for references and node features: hashed-words, two-tower, sentence.
-        renderer: auto, embree, rays or gl.
-        threshold: alarm when no demonstration reaches this score.
-        detector: of a strategy that steps in: scene-graph, objects, caption or image.
         without: a part to leave out: subtask-node, structure, nodes, edges, reasoning, validation.
-        image_encoder: of whole pictures, for the detector image: two-tower or clip.
-        captioner: of whole pictures, for the detector caption: listing or blip.
+        out: folder for the record, its pictures and the page; a new one under runs/ by default.
+        parts: which parts.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
     """
-    from forestall.build import RunConfig, prepare, provenance, run_episode
+    from forestall.assembly.configuration import run_config
+    from forestall.assembly.make import needs_memory, prepare, provenance, run_episode
+    from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
     from forestall.records.record import RunRecorder, read_record
     from forestall.report.page import write_page
 
-    config = RunConfig(
-        task,
-        scenario,
-        strategy,
-        seed,
-        renderer,
-        states=states,
-        feature=feature,
-        encoder=encoder,
-        threshold=threshold,
-        detector=detector,
-        without=without,
-        image_encoder=image_encoder,
-        captioner=captioner,
-    )
+    given, of_run = parts.read()
+    flags = {"scenario": scenario, "seed": seed, "without": without}
+    of_run |= {name: value for name, value in flags.items() if value is not None}
+    config = run_config(task, given=given, **of_run)
     prepared = prepare(config)
     name = None if prepared.scenario is None else prepared.scenario.name
-    folder = out or _new_folder(prepared.loaded.task.name, name, strategy, seed)
+    strategy = config.choice(STRATEGY).name
+    folder = out or _new_folder(prepared.loaded.task.name, name, strategy, config.seed)
     folder.mkdir(parents=True, exist_ok=True)
-    demonstrations, used = _memory(config, memory, quiet)
+    demonstrations, used = memory_of(config, quiet) if needs_memory(config) else (None, None)
     page = folder / "index.html"
     recorder = RunRecorder(
         folder,
@@ -108,24 +81,6 @@ def run(
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-def _memory(
-    config: RunConfig, memory: Path | None, quiet: bool
-) -> tuple[list[Demonstration] | None, str | None]:
-    if config.strategy == "none":
-        return None, None
-    from forestall.cli.demos import load_memory
-
-    return load_memory(
-        memory,
-        config.task,
-        config.states,
-        quiet,
-        config.feature,
-        config.image_encoder,
-        config.captioner,
-    )
 
 
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:

@@ -1,6 +1,6 @@
 """Conducts an experiment: everything is checked, demonstrations are made, episodes run.
 
-Calls: command line → here → engines → worker → build. What is in the folder is not run again.
+Calls: command line → here → engines → worker → assembly. What is in the folder is not run again.
 `results` makes what people look at.
 """
 
@@ -9,27 +9,36 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from forestall.build import prepare
-from forestall.demonstrations import ready_made
+from forestall.assembly.configuration import run_config
+from forestall.assembly.demonstrations import memory_path, ready_made
+from forestall.assembly.make import needs_memory, prepare
 from forestall.errors import InputError, UnknownNameError
 from forestall.experiments.engines import WorkerDiedError, check_engine, computed, make_lanes
-from forestall.experiments.folder import About, ResultsFolder
+from forestall.experiments.folder import EXPERIMENT, About, ResultsFolder, episodes_in
 from forestall.experiments.runs import (
     PAGES,
     PAPER_DETECTOR,
-    Choice,
     Run,
     Settings,
     by_scene,
-    runs_for,
 )
 from forestall.experiments.worker import Work, broken_row, config_of, run_one
 from forestall.memory.store import open_store
 from forestall.statistics.rows import EpisodeRow
 
 Progress = Callable[[int, int, str], None]
+
+
+class Wanted(Protocol):
+    """Which episodes are wanted: `runs.Choice`, or `episodes.Episodes`."""
+
+    def runs(self) -> Sequence[Run]:
+        """Each once; those of one case after its watched run."""
+
+    def about(self) -> Mapping[str, Any]:
+        """What all of them have in common, as JSON has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +51,21 @@ class Experiment:
         engine: "local" or "ray".
         address: of a Ray cluster.
         settings: what is the same for every episode.
+        kind: of the results; those of two kinds do not share a folder.
     """
 
-    choice: Choice
+    choice: Wanted
     workers: int = 1
     engine: str = "local"
     address: str | None = None
     settings: Settings = field(default_factory=Settings)
+    kind: str = EXPERIMENT
+
+    def about(self) -> About:
+        """What all its rows have in common: settings, code, and the content of a given memory."""
+        memory = memory_path(run_config("", given=self.settings.given))
+        what = {**self.choice.about(), "settings": self.settings.to_json()}
+        return About.now(self.kind, what, memory)
 
 
 def conduct(
@@ -70,13 +87,11 @@ def conduct(
     Raises:
         InputError: something that does not fit, each with what would be valid.
     """
-    runs = runs_for(experiment.choice)
+    runs = experiment.choice.runs()
     _check(experiment, runs)
-    folder = ResultsFolder(out)
+    folder = episodes_in(out, experiment.kind)
     with folder.alone():
-        rows = folder.open(
-            About.now(experiment.choice.split, experiment.choice.rounds, experiment.settings)
-        )
+        rows = folder.open(experiment.about())
         todo = [r for r in runs if r.key not in rows]
         if todo:
             with folder.effort_of(
@@ -98,8 +113,10 @@ def _check(experiment: Experiment, runs: Sequence[Run]) -> None:
     if experiment.settings.pages not in PAGES:
         raise UnknownNameError("pages", experiment.settings.pages, PAGES)
     check_engine(experiment.engine)
-    if experiment.settings.memory is not None:
-        with open_store(experiment.settings.memory) as store:
+    experiment.settings.parts()
+    memory = memory_path(run_config("", given=experiment.settings.given))
+    if memory is not None:
+        with open_store(memory) as store:
             store.required()
     one_each = {r.case: r for r in runs} | {replace(r, case=runs[0].case): r for r in runs}
     for run in one_each.values():
@@ -107,24 +124,16 @@ def _check(experiment: Experiment, runs: Sequence[Run]) -> None:
 
 
 def _demonstrations(runs: Sequence[Run], experiment: Experiment, progress: Progress) -> None:
-    if experiment.settings.memory is not None:
-        return
-    for task in sorted({r.case.task for r in runs}):
-        ready_made(
-            task,
-            experiment.settings.states,
-            progress=progress,
-            workers=experiment.workers,
-            feature=experiment.settings.feature,
-            image_encoder=experiment.settings.image_encoder,
-            captioner=experiment.settings.captioner,
-        )
+    configs = [config_of(run, experiment.settings) for run in runs]
+    one_each = {c.task: c for c in configs if needs_memory(c) and memory_path(c) is None}
+    for _, config in sorted(one_each.items()):
+        ready_made(config, progress=progress, workers=experiment.workers)
 
 
 def _computed(
     todo: Sequence[Run],
     rows: dict[str, EpisodeRow],
-    folder: ResultsFolder,
+    folder: ResultsFolder[EpisodeRow],
     experiment: Experiment,
     compute: Callable[[Work], dict[str, Any]],
 ) -> Iterator[EpisodeRow]:

@@ -1,8 +1,8 @@
 """The folder of an experiment's results: what it is, and one JSON line for each finished episode.
 
-Called by `conduct`. Every line is written at once and flushed, so that a run can be killed at any
-moment and taken up again; half a last line is dropped. Results of other code or other settings are
-never mixed in.
+Called by `conduct` and `speed`. Every line is written at once and flushed, so that a run can be
+killed at any moment and taken up again; half a last line is dropped. Results of other code, of
+another memory or of other settings are never mixed in.
 """
 
 from __future__ import annotations
@@ -12,57 +12,90 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Generic, Protocol, TypeVar
 
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
-from forestall.experiments.runs import Choice, Settings
+from forestall.experiments.runs import Choice
 from forestall.fingerprint import ROW_MAKING, sources_digest
 from forestall.records.record import replace_file
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
-KIND = "experiment"
+EXPERIMENT = "experiment"
 ABOUT = "experiment.json"
 ROWS = "episodes.jsonl"
 EFFORT = "effort.jsonl"
 LOCK = ".lock"
 
+R = TypeVar("R", bound="Row")
+
+
+class Row(Protocol):
+    """One finished piece of work: a line of the folder."""
+
+    @property
+    def key(self) -> str:
+        """What makes it the same one within the folder."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What all episodes of a folder have in common."""
+    """What all rows of a folder have in common; together with a row's key it says what it is.
 
-    split: str
-    rounds: int
-    settings: Settings
-    version: str = forestall.__version__
-    sources: str = ""
-    row_format: int = ROW_FORMAT
+    Args:
+        kind: of the rows.
+        what: settings and the like, as JSON has them.
+        sources: digest of the code and of the memory's content.
+    """
+
+    kind: str
+    what: dict[str, Any]
+    sources: str
 
     @classmethod
-    def now(cls, split: str, rounds: int, settings: Settings) -> About:
+    def now(cls, kind: str, what: Mapping[str, Any], memory: str | None = None) -> About:
         """With the digest of the code at hand, and of the memory if one is given."""
-        memory = Path(settings.memory).read_bytes() if settings.memory else b""
-        digest = sources_digest([hashlib.blake2b(memory).hexdigest()], but=ROW_MAKING)
-        return cls(split, rounds, settings, sources=digest)
+        content = Path(memory).read_bytes() if memory else b""
+        digest = sources_digest([hashlib.blake2b(content).hexdigest()], but=ROW_MAKING)
+        return cls(kind, json.loads(json.dumps(what)), digest)
+
+    @property
+    def digest(self) -> str:
+        """Eight hexadecimal digits of all of it: what may share a folder has the same."""
+        text = json.dumps(_flat(self.to_json()), sort_keys=True)
+        return hashlib.blake2b(text.encode(), digest_size=4).hexdigest()
+
+    def to_json(self) -> dict[str, Any]:
+        """As it stands in the folder."""
+        code = {"version": forestall.__version__, "sources": self.sources}
+        return {"kind": self.kind, **self.what, **code, "row_format": ROW_FORMAT}
 
 
-class ResultsFolder:
+class ResultsFolder(Generic[R]):
     """Reads and writes one folder of results.
 
     Args:
         path: made when something is first written.
+        read: makes a row of what its `to_json` gave.
+        kind: of the rows.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self, path: Path, read: Callable[[dict[str, Any]], R], kind: str = EXPERIMENT
+    ) -> None:
         self.path = path
+        self._read = read
+        self._kind = kind
 
-    def open(self, about: About) -> dict[str, EpisodeRow]:
-        """Begin or take up an experiment; the rows that are there, by key.
+    def open(self, about: About) -> dict[str, R]:
+        """Begin or take up the work; the rows that are there, by key.
 
         Raises:
             InputError: the folder holds other results, or is no folder that can be written.
@@ -71,7 +104,7 @@ class ResultsFolder:
         file = self.path / ABOUT
         if not file.exists():
             with _room(file):
-                replace_file(file, json.dumps({"kind": KIND, **asdict(about)}, indent=2).encode())
+                replace_file(file, json.dumps(about.to_json(), indent=2).encode())
             return {}
         self._check(about)
         return self.rows(mend=True)
@@ -90,11 +123,15 @@ class ResultsFolder:
             data = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise FileFormatError(f"{file}: no experiment: {error}") from error
-        if not isinstance(data, dict) or data.get("kind") != KIND:
-            raise FileFormatError(f"{file}: no experiment")
+        if not isinstance(data, dict) or data.get("kind") != self._kind:
+            raise FileFormatError(f"{file}: no {self._kind}")
+        if self._kind == EXPERIMENT and "parts" not in data.get("settings", {}):
+            raise FileFormatError(
+                f"{file}: results of an earlier version; run the experiment again"
+            )
         return data
 
-    def rows(self, mend: bool = False) -> dict[str, EpisodeRow]:
+    def rows(self, mend: bool = False) -> dict[str, R]:
         """Every finished episode by key.
 
         Args:
@@ -113,7 +150,7 @@ class ResultsFolder:
         rows = {}
         for number, line in enumerate(whole.splitlines(), 1):
             try:
-                row = EpisodeRow.from_json(json.loads(line))
+                row = self._read(json.loads(line))
             except (ValueError, AttributeError, FileFormatError) as error:
                 raise FileFormatError(f"{file}, line {number}: {error}") from error
             rows[row.key] = row
@@ -149,16 +186,14 @@ class ResultsFolder:
         with lines:
             yield lines
 
-    def add(self, lines: IO[str], row: EpisodeRow) -> None:
+    def add(self, lines: IO[str], row: R) -> None:
         """Write one episode."""
         with _room(self.path / ROWS):
             lines.write(json.dumps(row.to_json()) + "\n")
             lines.flush()
 
     @contextmanager
-    def effort_of(
-        self, choice: Choice, workers: int, engine: str
-    ) -> Iterator[Callable[[int], None]]:
+    def effort_of(self, choice: Any, workers: int, engine: str) -> Iterator[Callable[[int], None]]:
         """Write down what a call of the command was for, and at its end what it did and where.
 
         Yields what is to be told how many episodes are done.
@@ -237,13 +272,18 @@ class ResultsFolder:
             )
 
     def _check(self, about: About) -> None:
-        found, wanted = _flat(self.about()), _flat({"kind": KIND, **asdict(about)})
+        found, wanted = _flat(self.about()), _flat(about.to_json())
         for name, value in wanted.items():
             if found.get(name) != value:
                 raise InputError(
                     f"{self.path} holds results with {name} {found.get(name)!r}, this run has "
                     f"{value!r}: give another --out, or remove the folder"
                 )
+
+
+def episodes_in(path: Path, kind: str = EXPERIMENT) -> ResultsFolder[EpisodeRow]:
+    """A folder of episodes."""
+    return ResultsFolder(path, EpisodeRow.from_json, kind)
 
 
 @contextmanager
@@ -259,8 +299,12 @@ def _room(file: Path) -> Iterator[None]:
 
 
 def _flat(about: dict[str, Any]) -> dict[str, Any]:
-    """With the settings among the other fields, without what changes no episode."""
+    """With the settings among the other fields, without what changes no row."""
     fields = {**about, **about.get("settings", {})}
+    for kind, part in fields.pop("parts", {}).items():
+        fields[kind] = part["name"]
+        for option, value in {**part["defaulted"], **part["given"]}.items():
+            fields[f"{kind}.{option}"] = value
     return {k: v for k, v in fields.items() if k not in ("settings", "pages")}
 
 

@@ -1,6 +1,6 @@
 """From the rows of a folder to its summary, tables, figures and page. Nothing is run.
 
-Called by the command line after an experiment, or on its own; calls benchmark and report.
+Called by the command line after an experiment, or on its own; calls statistics and report.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError
-from forestall.experiments.folder import ResultsFolder
+from forestall.experiments.folder import ResultsFolder, episodes_in
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
 from forestall.records.record import replace_file
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import CASE_SETS, cases
 from forestall.statistics.findings import findings
+from forestall.statistics.rows import EpisodeRow
 from forestall.statistics.summary import summary as summarised
 from forestall.statistics.tables import Table, tables
 
@@ -39,7 +40,7 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
     Raises:
         FileFormatError: it holds no experiment, or no episode.
     """
-    folder = ResultsFolder(path)
+    folder = episodes_in(path)
     about = folder.about()
     rows = list(folder.rows().values())
     if not rows:
@@ -65,7 +66,7 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
     told = {
         "title": f"Experiments on the {about['split']} split",
         **{k: v for k, v in meta.items() if k not in ("settings", "effort")},
-        **{k: v for k, v in about["settings"].items() if v},
+        **{kind: _said(part) for kind, part in about["settings"]["parts"].items()},
         "episodes": f"{len(rows)}, {sum(not r.implied for r in rows)} of them executed, in "
         f"{sum(sum(r.compute_s.values()) for r in rows) / 3600:.1f} h of one worker",
         **meta["effort"],
@@ -76,7 +77,9 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
     return data, made
 
 
-def _missing(folder: ResultsFolder, about: dict[str, Any], found: set[str]) -> list[str]:
+def _missing(
+    folder: ResultsFolder[EpisodeRow], about: dict[str, Any], found: set[str]
+) -> list[str]:
     """What was asked for and is not there, and what was not asked for."""
     wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
     lacking = Counter(
@@ -93,5 +96,12 @@ def _missing(folder: ResultsFolder, about: dict[str, Any], found: set[str]) -> l
 
 def shown_names(settings: dict[str, Any]) -> dict[str, str]:
     """How detectors are called; offline stand-ins are called stand-ins."""
-    used = {"image": settings.get("image_encoder"), "caption": settings.get("captioner")}
-    return {d: STAND_INS[d, str(w)] for d, w in used.items() if (d, str(w)) in STAND_INS}
+    parts = settings["parts"]
+    used = {"image": parts["image-encoder"]["name"], "caption": parts["captioner"]["name"]}
+    return {d: STAND_INS[d, w] for d, w in used.items() if (d, w) in STAND_INS}
+
+
+def _said(part: dict[str, Any]) -> str:
+    """A part and the options that were given to it, in words."""
+    options = ", ".join(f"{option} {value}" for option, value in part["given"].items())
+    return f"{part['name']} ({options})" if options else str(part["name"])

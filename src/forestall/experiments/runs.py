@@ -1,6 +1,6 @@
 """Which episodes each experiment consists of.
 
-Called by `conduct`; reads `benchmark.cases`. In the run "watch" of every case all detectors judge
+Called by `conduct`; reads `statistics.cases`. In the run "watch" of every case all detectors judge
 and none interrupts, so that they are compared on the same observations. "none" is the same without
 them: the paper's detector sometimes asks for a second look, which takes the robot its time.
 """
@@ -8,11 +8,15 @@ them: the paper's detector sometimes asks for a second look, which takes the rob
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
+from forestall.assembly.configuration import Choice as Part
+from forestall.assembly.configuration import Given, choices
+from forestall.assembly.registry import find
 from forestall.errors import InputError, UnknownNameError
-from forestall.parts import STATES, THRESHOLD
-from forestall.registry import load
+from forestall.kinds import DETECTOR, STRATEGY
 from forestall.statistics.cases import CASE_SETS, UNDISTURBED, Case, cases
 from forestall.statistics.metrics import THRESHOLDS
 from forestall.statistics.rows import row_key
@@ -27,27 +31,45 @@ BASELINES = ("objects", "caption", "image")
 PAPER_DETECTOR = "scene-graph"
 
 
+OWN = (DETECTOR.name, STRATEGY.name)
+"""The kinds of parts that an experiment chooses by itself, run by run."""
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """What is the same for every episode of an experiment.
 
     Args:
-        states: where object states come from.
-        encoder: of texts.
-        feature: what a node's feature encodes.
-        image_encoder: of whole pictures.
-        captioner: of whole pictures.
-        memory: a demonstration file; None for the ready-made one of each task.
+        given: what was said about the parts; strategy and detector are the experiment's own.
         pages: which episodes get a page of their own, one of `PAGES`.
     """
 
-    states: str = STATES
-    encoder: str = "hashed-words"
-    feature: str = "parts"
-    image_encoder: str = "two-tower"
-    captioner: str = "listing"
-    memory: str | None = None
+    given: Given = field(default_factory=Given)
     pages: str = "telling"
+
+    def parts(self) -> tuple[Part, ...]:
+        """The checked choice of every kind but the experiment's own.
+
+        Raises:
+            InputError: one that is not valid, or one that is the experiment's own.
+        """
+        for kind in self.given.kinds():
+            if kind in OWN:
+                raise InputError(f"an experiment chooses the {kind} of each run by itself")
+        return tuple(part for part in choices(self.given) if part.kind not in OWN)
+
+    def to_json(self) -> dict[str, Any]:
+        """As it stands in the folder of the results."""
+        return {"parts": {p.kind: p.to_json() for p in self.parts()}, "pages": self.pages}
+
+
+@cache
+def paper_threshold() -> float:
+    """The threshold of the paper's detector when nothing is said."""
+    threshold: float = (
+        Given.named({"detector": PAPER_DETECTOR}).chosen("detector").options["threshold"]
+    )
+    return threshold
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -57,7 +79,7 @@ class Run:
     case: Case
     strategy: str
     detector: str = PAPER_DETECTOR
-    threshold: float = THRESHOLD
+    threshold: float = field(default_factory=paper_threshold)
     without: str | None = None
 
     @property
@@ -90,6 +112,14 @@ class Choice:
     limit: int | None = None
     sets: tuple[str, ...] = ()
     strategies: tuple[str, ...] = ()
+
+    def runs(self) -> tuple[Run, ...]:
+        """See `runs_for`."""
+        return runs_for(self)
+
+    def about(self) -> dict[str, Any]:
+        """What all its episodes have in common, with others of the same folder."""
+        return {"split": self.split, "rounds": self.rounds}
 
     def takes(self, run: Run) -> bool:
         """Whether a run is among the wanted sets and strategies."""
@@ -138,7 +168,7 @@ def _check(choice: Choice) -> None:
         if name not in CASE_SETS:
             raise UnknownNameError("set of cases", name, CASE_SETS)
     for name in choice.strategies:
-        load("strategy", name)
+        find(STRATEGY.name, name)
 
 
 def by_scene(runs: Iterable[Run]) -> list[list[Run]]:

@@ -1,4 +1,4 @@
-"""One episode → one row. Called in a worker process by an engine; calls build.
+"""One episode → one row. Called in a worker process by an engine; calls assembly.
 
 Whatever goes wrong in an episode becomes a row that says so: it counts as a failure and is seen.
 """
@@ -11,20 +11,21 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from forestall.build import Prepared, RunConfig, prepare, run_episode
-from forestall.demonstrations import ready_made
+from forestall.assembly.configuration import Choice, RunConfig, run_config
+from forestall.assembly.demonstrations import load_memory
+from forestall.assembly.make import Prepared, make_world, needs_memory, prepare, run_episode
 from forestall.experiments.runs import Run, Settings
-from forestall.memory.store import open_store
+from forestall.kinds import WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
+from forestall.seams import WorldPart
 from forestall.statistics.rows import EpisodeRow, Judged
 from forestall.tasks.faults import knowable
 from forestall.tasks.truth import TruthTrace
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, SkillStatus
 from forestall.types.verdict import Decision, ReplanOutcome
-from forestall.worlds.kitchen.rendering import FrameMemory
 
 PAGES = "episodes"
 """Folder of the episodes' own pages, inside that of an experiment."""
@@ -49,22 +50,17 @@ class Work:
 
 
 def config_of(run: Run, settings: Settings) -> RunConfig:
-    """The run as `build` wants it."""
+    """The run as `assembly` wants it."""
     case = run.case
-    return RunConfig(
+    return run_config(
         case.task,
         case.scenario,
-        run.strategy,
-        case.seed,
-        states=settings.states,
-        encoder=settings.encoder,
-        feature=settings.feature,
-        threshold=run.threshold,
-        keep_observations=False,
-        detector=run.detector,
+        seed=case.seed,
         without=run.without,
-        image_encoder=settings.image_encoder,
-        captioner=settings.captioner,
+        keep_observations=False,
+        given=settings.given,
+        strategy=run.strategy,
+        detector={"name": run.detector, "threshold": run.threshold},
     )
 
 
@@ -106,7 +102,9 @@ def broken_row(run: Run, error: str, prepared: Prepared | None = None) -> Episod
 
 
 def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
-    demonstrations, memory = _memory(work.run.case.task, work.settings)
+    demonstrations, memory = None, None
+    if needs_memory(prepared.config):
+        demonstrations, memory = _memory(work.run.case.task, work.settings)
     listeners = []
     folder = work.page_folder
     if folder is not None:
@@ -118,7 +116,7 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
                 page="index.html",
             )
         )
-    record = run_episode(prepared, demonstrations, listeners, memory, trace, _frames())
+    record = run_episode(prepared, demonstrations, listeners, memory, trace, _world(prepared))
     if folder is not None:
         dull = not work.run.case.failing and record.success and not alarms(record)
         if work.settings.pages == "telling" and dull:
@@ -216,26 +214,23 @@ def _judged(
     )
 
 
-@cache
-def _frames() -> FrameMemory:
-    """What this process drew lately."""
-    return FrameMemory()
+_worlds: dict[Choice, WorldPart] = {}
+"""The worlds part of this process, which remembers what it drew lately."""
+
+
+def _world(prepared: Prepared) -> WorldPart:
+    choice = prepared.config.choice(WORLD)
+    if choice not in _worlds:
+        _worlds.clear()
+        _worlds[choice] = make_world(prepared.config, prepared.loaded.domain)
+    return _worlds[choice]
 
 
 @cache
 def _memory(task: str, settings: Settings) -> tuple[tuple[Demonstration, ...], str]:
-    path = settings.memory or str(
-        ready_made(
-            task,
-            settings.states,
-            workers=1,
-            feature=settings.feature,
-            image_encoder=settings.image_encoder,
-            captioner=settings.captioner,
-        )
-    )
-    with open_store(path) as store:
-        return tuple(store.required()), path
+    config = run_config(task, given=settings.given)
+    demonstrations, path = load_memory(config, workers=1)
+    return tuple(demonstrations), path
 
 
 __all__ = ["PAGES", "Work", "broken_row", "config_of", "run_one"]

@@ -1,6 +1,6 @@
 """Judging a stored observation of the user's own (no simulator, nothing is executed).
 
-Calls: command line → here → build, perception. Composition like `build.py`, for `forestall check`.
+Calls: command line → here → parts, perception. Composition like `make`, for `forestall check`.
 """
 
 from __future__ import annotations
@@ -8,19 +8,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from forestall.comparison.preconditions import mine, violations
-from forestall.diagnosis.symbolic import SymbolicReasoner
-from forestall.domain.load import shipped
+from forestall.assembly.configuration import Given, choices
+from forestall.assembly.make import STORED_STATES
+from forestall.assembly.parts import Assembly
+from forestall.assembly.registry import find, known
+from forestall.domain.model import Domain
 from forestall.domain.names import ground_subtask
-from forestall.embeddings.hashed import HashedTextEncoder
 from forestall.errors import UnknownNameError
-from forestall.memory.retrieval import EmbeddingRetriever
-from forestall.parts import RunConfig, make_detector, make_state_estimator
+from forestall.kinds import DETECTOR, DOMAIN, PERCEIVER, REASONER, RETRIEVER, STATES
 from forestall.perception.folder import read_observation
-from forestall.perception.given import GivenStateEstimator
-from forestall.perception.perceiver import GraphPerceiver
-from forestall.perception.segmenters import GivenMasks
-from forestall.registry import known
 from forestall.tasks.files import load_task
 from forestall.types.demonstration import Demonstration
 from forestall.types.graph import SceneGraph
@@ -30,14 +26,19 @@ from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Decision, Diagnosis, Verdict
 
+TRUTH_STATES = "oracle"
+"""The simulator's own, which no stored observation has."""
+
+DEFAULTS = Given.named({"segmenter": "given-masks", "states": STORED_STATES})
+"""What a stored observation brings with it: its masks and, if nothing else reads them, states."""
+
 
 def judge_stored(
     folder: Path,
     subtask: str,
     task: str | None,
     demonstrations: Sequence[Demonstration],
-    threshold: float,
-    states: str = "given",
+    given: Given | None = None,
 ) -> tuple[SceneGraph, Verdict, Diagnosis | None]:
     """The scoped graph, the verdict, and on an alarm the diagnosis.
 
@@ -46,37 +47,33 @@ def judge_stored(
         subtask: in text form.
         task: name or file of the task; its own demonstrations are preferred.
         demonstrations: the memory.
-        threshold: of the detector.
-        states: "given", those in the folder; or what reads them off its pictures.
+        given: what was said about parts: the detector's threshold, what reads states off pictures.
 
     Raises:
         InputError: a name, the observation or the subtask is not valid.
     """
+    chosen = choices((given or Given()).over(DEFAULTS))
+    names = {c.kind: c.name for c in chosen}
+    if names[STATES.name] == TRUTH_STATES:
+        readable = [n for n in known(STATES.name) if n != TRUTH_STATES]
+        raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)
     loaded = None if task is None else load_task(task)
-    domain = shipped("household") if loaded is None else loaded.domain
+    own = find(DOMAIN.name, names[DOMAIN.name])
+    domain: Domain = own.factory() if loaded is None else loaded.domain
     wanted = domain.check(Subtask.parse(subtask))
     for name in wanted.args:
         domain[name]
-    if states not in known("states") or states == "oracle":
-        options = [n for n in known("states") if n != "oracle"]
-        raise UnknownNameError("states of a stored observation", states, options)
-    observation, given = read_observation(folder, domain)
-    estimator = (
-        GivenStateEstimator(given) if states == "given" else make_state_estimator(states, domain)
-    )
-    perceiver = GraphPerceiver(GivenMasks(), estimator, domain)
+    observation, stated = read_observation(folder, domain)
+    parts = Assembly(chosen, domain, demonstrations, {"states": stated})
+    perceiver = parts.part(PERCEIVER)
     graph = perceiver.perceive(observation)
     ground = ground_subtask(wanted, graph, domain, observation.robot_position_world_m, {})
     scoped = perceiver.scope(graph, ground)
     name = "" if loaded is None else loaded.task.name
     steps = () if loaded is None else loaded.task.plan.subtasks
     done = steps.index(wanted) if wanted in steps else 0
-    encoder = HashedTextEncoder()
-    references = tuple(
-        EmbeddingRetriever(demonstrations, encoder, domain).retrieve(ground, name, done)
-    )
-    detector = make_detector(RunConfig(name, threshold=threshold), domain)
-    verdict = detector.judge(scoped, observation, references)
+    references = tuple(parts.part(RETRIEVER).retrieve(ground, name, done))
+    verdict = parts.part(DETECTOR).judge(scoped, observation, references)
     if verdict.decision is Decision.PROCEED:
         return scoped, verdict, None
     plan = Plan((wanted,))
@@ -91,5 +88,4 @@ def judge_stored(
         observation=observation,
         references=references,
     )
-    reasoner = SymbolicReasoner(mine, violations, domain)
-    return scoped, verdict, reasoner.diagnose(context, verdict)
+    return scoped, verdict, parts.part(REASONER).diagnose(context, verdict)

@@ -1,8 +1,8 @@
-"""Configuration → objects: where implementations of different families meet.
+"""Configuration → a run: task, scenario, world, perception and strategy put together.
 
-Calls: command line → here → runtime, environment, perception, memory, comparison, planning. The
-oracle view of an environment is handed to exactly three places here: the oracle state estimator,
-when that is the one asked for, the scorer, and the trace of the truth that an experiment may keep.
+Calls: command line, experiments → here → registry (through `parts`), runtime. The oracle view of a
+world is handed to exactly three places here: the oracle state estimator, when that is the one asked
+for, the scorer, and the trace of the truth that an experiment may keep.
 """
 
 from __future__ import annotations
@@ -15,26 +15,15 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import forestall
-from forestall.comparison.preconditions import MiningConfig
+from forestall.assembly.configuration import RunConfig
+from forestall.assembly.parts import Assembly
+from forestall.assembly.registry import known
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.memory.retrieval import RetrievalConfig
-from forestall.parts import (
-    STATES,
-    RunConfig,
-    check_parts,
-    make_state_estimator,
-    make_strategy,
-    node_encoder,
-    score_options,
-)
-from forestall.perception.config import PerceptionConfig, ScopeConfig
-from forestall.perception.perceiver import GraphPerceiver
-from forestall.planning.search import SearchConfig
-from forestall.registry import known, load
+from forestall.kinds import PERCEIVER, STATES, STRATEGY, WORLD
 from forestall.runtime import Runtime, RuntimeConfig
-from forestall.seams import Listener
+from forestall.seams import Listener, OpenWorld, OracleView, Strategy, WorldPart
 from forestall.tasks.faults import (
     Fault,
     apply_plan_faults,
@@ -48,23 +37,12 @@ from forestall.tasks.truth import TruthTrace
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Plan
-from forestall.worlds.kitchen.environment import KitchenEnvironment
-from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
 
-__all__ = ["RUN_STATES", "STATES", "Prepared", "RunConfig", "prepare", "provenance", "run_episode"]
+STORED_STATES = "given"
+"""The states of stored observations, which no run has."""
 
-OPTIONS = (
-    MiningConfig(),
-    PerceptionConfig(),
-    RetrievalConfig(),
-    RuntimeConfig(),
-    ScopeConfig(),
-    SearchConfig(),
-)
-"""The options of the parts as every run uses them; with the score's they go into the record."""
-
-RUN_STATES = tuple(n for n in known("states") if n != "given")
-"""Where a run's object states may come from; given ones belong to stored observations."""
+PACKAGES = ("numpy", "scipy", "mujoco-core", "embreex", "onnxruntime")
+"""Whose versions stand in every record."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,17 +65,16 @@ class Prepared:
 
 
 def prepare(config: RunConfig) -> Prepared:
-    """Read and check task, scenario and names.
+    """Read and check task and scenario against each other and the configuration.
 
     Raises:
         InputError: anything that does not fit, each with what would be valid.
     """
     loaded = load_task(config.task)
-    check_parts(config)
-    if config.states not in RUN_STATES:
-        raise UnknownNameError("states of a run", config.states, RUN_STATES)
-    if config.renderer not in RENDERERS:
-        raise UnknownNameError("renderer", config.renderer, RENDERERS)
+    if config.choice(STATES).name == STORED_STATES:
+        of_runs = [n for n in known(STATES.name) if n != STORED_STATES]
+        raise UnknownNameError("states of a run", STORED_STATES, of_runs)
+    make_world(config, loaded.domain)
     scenario = None if config.scenario is None else load_scenario(config.scenario)
     if scenario is not None and scenario.task != loaded.task.name:
         raise InputError(
@@ -105,7 +82,7 @@ def prepare(config: RunConfig) -> Prepared:
         )
     if config.seed < 0:
         raise InputError(f"seed {config.seed} is negative; seeds are 0, 1, 2, ...")
-    if config.seed >= DEMONSTRATION_SEEDS and config.strategy != "none":
+    if config.seed >= DEMONSTRATION_SEEDS and needs_memory(config):
         raise InputError(f"seed {config.seed}: from {DEMONSTRATION_SEEDS} on are demonstrations")
     if config.seed >= PICTURE_SEEDS["train"]:
         raise InputError(f"seed {config.seed}: from {PICTURE_SEEDS['train']} on are pictures")
@@ -120,13 +97,30 @@ def prepare(config: RunConfig) -> Prepared:
     return prepared
 
 
+def needs_memory(config: RunConfig) -> bool:
+    """Whether a run compares with demonstrations."""
+    return config.choice(STRATEGY).name != "none"
+
+
+def make_world(config: RunConfig, domain: Domain) -> WorldPart:
+    """What makes the worlds of a run."""
+    return Assembly(config.choices, domain).part(WORLD)
+
+
+def make_strategy(
+    config: RunConfig, domain: Domain, demonstrations: Sequence[Demonstration] | None
+) -> Strategy:
+    """The strategy with its collaborators, without a world."""
+    return Assembly(config.choices, domain, demonstrations).part(STRATEGY)
+
+
 def run_episode(
     prepared: Prepared,
     demonstrations: Sequence[Demonstration] | None,
     listeners: Sequence[Listener] = (),
     memory: str | None = None,
     trace: TruthTrace | None = None,
-    frames: FrameMemory | None = None,
+    world: WorldPart | None = None,
 ) -> EpisodeRecord:
     """Build everything and run one episode.
 
@@ -136,62 +130,69 @@ def run_episode(
         listeners: told what happens.
         memory: where the demonstrations come from, for the record.
         trace: keeps what is true at each boundary, for scoring.
-        frames: pictures that were drawn before.
+        world: made before and used again, so that it may remember what it drew.
     """
-    config, loaded, task = prepared.config, prepared.loaded, prepared.loaded.task
-    needs = apply_scene_faults(task.scene, prepared.faults, loaded.domain)
-    kitchen = KitchenEnvironment(needs, loaded.domain, config.renderer, frames=frames)
-    if trace is not None:
-        trace.attach(kitchen.oracle, loaded.domain)
-        listeners = (*listeners, trace)
-    try:
-        perceiver = GraphPerceiver(
-            load("segmenter", config.segmenter)(),
-            _state_estimator(config.states, kitchen, loaded.domain),
-            loaded.domain,
-            image_encoder=node_encoder(config),
-        )
-        runtime = Runtime(
-            wrap(kitchen, prepared.faults, kitchen, loaded.domain),
-            perceiver,
-            make_strategy(config, loaded.domain, demonstrations),
-            loaded.domain,
-            listeners,
-            RuntimeConfig(keep_observations=config.keep_observations, final_look=config.final_look),
-        )
+    loaded = prepared.loaded
+    needs = apply_scene_faults(loaded.task.scene, prepared.faults, loaded.domain)
+    part = world or make_world(prepared.config, loaded.domain)
+    with part.open(needs, loaded.domain, remember=world is not None) as opened:
+        if trace is not None:
+            trace.attach(opened.oracle, loaded.domain)
+            listeners = (*listeners, trace)
+        runtime = make_runtime(prepared, opened, demonstrations, listeners)
         return runtime.run(
-            task,
+            loaded.task,
             prepared.plan,
-            config.seed,
+            prepared.config.seed,
             None if prepared.scenario is None else prepared.scenario.name,
-            _scorer(kitchen, loaded.domain),
+            _scorer(opened.oracle, loaded.domain),
             (
-                *provenance(config),
+                *provenance(prepared.config),
                 ("memory", memory),
                 ("demonstrations", [{"id": d.id, "seed": d.seed} for d in demonstrations or ()]),
                 ("inputs", {"task": repr(loaded.task), "scenario": repr(prepared.scenario)}),
             ),
         )
-    finally:
-        kitchen.close()
+
+
+def make_runtime(
+    prepared: Prepared,
+    world: OpenWorld,
+    demonstrations: Sequence[Demonstration] | None,
+    listeners: Sequence[Listener],
+) -> Runtime:
+    """The loop around an open world."""
+    config, domain = prepared.config, prepared.loaded.domain
+    parts = Assembly(config.choices, domain, demonstrations, {"truth": world.oracle})
+    return Runtime(
+        wrap(world.environment, prepared.faults, world.disturbance, domain),
+        parts.part(PERCEIVER),
+        parts.part(STRATEGY),
+        domain,
+        listeners,
+        _limits(config),
+    )
 
 
 def provenance(config: RunConfig) -> tuple[tuple[str, Any], ...]:
-    """What is needed to run the same again."""
-    packages = ("numpy", "scipy", "mujoco-core", "embreex", "onnxruntime")
+    """What is needed to run the same again: what was given, and what was left to defaults."""
     return (
-        ("config", asdict(config)),
-        ("options", {type(o).__name__: asdict(o) for o in (*OPTIONS, score_options(config))}),
+        ("config", config.to_json()),
+        ("loop", asdict(_limits(config))),
         (
             "versions",
             {
                 "forestall": forestall.__version__,
                 "python": sys.version.split()[0],
-                **{name: _version(name) for name in packages},
+                **{name: _version(name) for name in PACKAGES},
                 "platform": platform.platform(),
             },
         ),
     )
+
+
+def _limits(config: RunConfig) -> RuntimeConfig:
+    return RuntimeConfig(keep_observations=config.keep_observations, final_look=config.final_look)
 
 
 def _version(package: str) -> str | None:
@@ -201,24 +202,16 @@ def _version(package: str) -> str | None:
         return None
 
 
-def _state_estimator(name: str, kitchen: KitchenEnvironment, domain: Domain) -> Any:
-    if name == "oracle":
-        return load("states", name)(kitchen.oracle.states, domain)
-    return make_state_estimator(name, domain)
-
-
-def _scorer(
-    kitchen: KitchenEnvironment, domain: Domain
-) -> Callable[[EpisodeRecord], EpisodeRecord]:
+def _scorer(oracle: OracleView, domain: Domain) -> Callable[[EpisodeRecord], EpisodeRecord]:
     def score(record: EpisodeRecord) -> EpisodeRecord:
-        strict, weak, failures = TruthGoalChecker(domain).check(record.task.goal, kitchen.oracle)
+        strict, weak, failures = TruthGoalChecker(domain).check(record.task.goal, oracle)
         return replace(
             record,
             success=strict,
             weak_success=weak,
             failures=(*record.failures, *failures),
-            events=kitchen.oracle.events(),
-            harmed=irreversible(record.task.goal, kitchen.oracle, domain),
+            events=oracle.events(),
+            harmed=irreversible(record.task.goal, oracle, domain),
         )
 
     return score

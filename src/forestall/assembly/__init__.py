@@ -1,0 +1,1 @@
+"""One composition root: configuration → objects; the one place that imports implementations."""

@@ -1,0 +1,225 @@
+"""Factories of what remembers, judges, explains and corrects.
+
+Named in `registry`, called through `parts`; calls memory, comparison, detection, diagnosis,
+replanning, planning, strategies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Annotated, Any, TypeVar
+
+from forestall.assembly.configuration import SWITCHES
+from forestall.assembly.seeing import look_encoder
+from forestall.comparison.options import Feature, ScoreConfig
+from forestall.comparison.preconditions import MiningConfig, mine, violations
+from forestall.comparison.score import BatchScorer
+from forestall.detection.caption import CaptionDetector
+from forestall.detection.image import ImageDetector
+from forestall.detection.objects import ObjectCountDetector
+from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
+from forestall.diagnosis.none import NoReasoning
+from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.errors import InputError
+from forestall.kinds import (
+    CAPTIONER,
+    DETECTOR,
+    IMAGE_ENCODER,
+    PERCEIVER,
+    REASONER,
+    REPLANNER,
+    RETRIEVER,
+    TEXT_ENCODER,
+    VALIDATOR,
+)
+from forestall.memory.retrieval import EmbeddingRetriever, RetrievalConfig
+from forestall.memory.store import SqliteStore, open_store
+from forestall.perception.config import ScopeConfig
+from forestall.perception.scope import scope
+from forestall.planning.search import SearchConfig
+from forestall.planning.validate import GraphValidator
+from forestall.replanning.anew import GoalReplanner
+from forestall.replanning.symbolic import PlannerReplanner
+from forestall.seams import Detector, Parts, PlanValidator
+from forestall.strategies.online import Online, OnlineScene
+from forestall.strategies.post_hoc import PostHoc
+from forestall.strategies.proactive import Proactive
+from forestall.strategies.watch import Watch
+from forestall.types.kind import Settled
+
+S = TypeVar("S")
+
+
+def sqlite(*, path: str | None = None, busy_timeout_s: float = 5.0) -> SqliteStore:
+    """A memory in one file.
+
+    Args:
+        path: of the file; a run without it uses its task's ready-made memory.
+        busy_timeout_s: how long to wait for another process that is writing.
+    """
+    if path is None:
+        raise InputError("the store 'sqlite' needs the option path, the memory file")
+    return open_store(path, busy_timeout_s=busy_timeout_s)
+
+
+def embedding(parts: Parts, *, retrieval: RetrievalConfig | None = None) -> EmbeddingRetriever:
+    """References by the likeness of subtask texts.
+
+    Raises:
+        InputError: the memory is empty, or the node features in it come from another encoder.
+    """
+    demonstrations = parts.demonstrations
+    if parts.options(PERCEIVER).get("feature") == Feature.IMAGE.value:
+        wanted = look_encoder(parts).name
+        for d in demonstrations:
+            made = dict(d.perception).get("features")
+            if made != wanted:
+                raise InputError(
+                    f"the node features of demonstration {d.id} come from {made or 'nothing'}, "
+                    f"this run's from {wanted}: record the memory with the same --states and "
+                    "--feature"
+                )
+    return EmbeddingRetriever(demonstrations, parts.part(TEXT_ENCODER), parts.domain, retrieval)
+
+
+def scene_graph(
+    parts: Parts,
+    *,
+    alarm: DetectorConfig | None = None,
+    score: Annotated[ScoreConfig | None, Settled("feature")] = None,
+) -> SceneGraphDetector:
+    """The paper's score; without a part of it, its name says so.
+
+    What a node's feature encodes is the perceiver's affair, who makes it.
+    """
+    options = score or ScoreConfig()
+    feature = parts.options(PERCEIVER).get("feature")
+    if feature is not None:
+        options = replace(options, feature=Feature(feature))
+    left_out = [part for part, switch in SWITCHES.items() if not getattr(options, switch)]
+    name = SceneGraphDetector.name
+    if left_out:
+        name = f"{name} without {' and '.join(p.replace('-', ' ') for p in left_out)}"
+    scorer = BatchScorer(options, parts.part(TEXT_ENCODER), parts.domain)
+    return SceneGraphDetector(scorer, alarm, name=name)
+
+
+def objects(parts: Parts, *, alarm: DetectorConfig | None = None) -> ObjectCountDetector:
+    """Likeness of the counts of categories."""
+    return ObjectCountDetector(parts.domain, alarm)
+
+
+def image(parts: Parts, *, alarm: DetectorConfig | None = None) -> ImageDetector:
+    """Likeness of whole pictures."""
+    return ImageDetector(parts.part(IMAGE_ENCODER), alarm)
+
+
+def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDetector:
+    """Likeness of captions."""
+    return CaptionDetector(parts.part(CAPTIONER), parts.part(TEXT_ENCODER), alarm)
+
+
+def preconditions(parts: Parts, *, mining: MiningConfig | None = None) -> SymbolicReasoner:
+    """What always held before the subtask and does not now."""
+    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain)
+
+
+def no_reasoning(parts: Parts) -> NoReasoning:
+    """The goal alone."""
+    return NoReasoning(parts.domain)
+
+
+def planner(
+    parts: Parts, *, validator: str | None = None, search: SearchConfig | None = None
+) -> PlannerReplanner:
+    """A repair by search.
+
+    Args:
+        parts: validator, domain.
+        validator: of what is found; the run's own by default.
+        search: its limits.
+    """
+    return PlannerReplanner(_validator(parts, validator), parts.domain, search)
+
+
+def anew(
+    parts: Parts, *, validator: str | None = None, search: SearchConfig | None = None
+) -> GoalReplanner:
+    """A plan for the goal as if there had been none; options as `planner`."""
+    return GoalReplanner(_validator(parts, validator), parts.domain, search)
+
+
+def _validator(parts: Parts, name: str | None) -> PlanValidator:
+    return parts.part(VALIDATOR) if name is None else parts.part(VALIDATOR, name)
+
+
+def graph_validator(parts: Parts) -> GraphValidator:
+    """Executes a plan on the observed graph."""
+    return GraphValidator(parts.domain)
+
+
+def proactive(parts: Parts, *, max_attempts: int | None = None) -> Proactive:
+    """Ours: before each subtask."""
+    return _stepping_in(Proactive, parts, max_attempts)
+
+
+def post_hoc(parts: Parts, *, max_attempts: int | None = None) -> PostHoc:
+    """After the whole task (REFLECT)."""
+    return _stepping_in(PostHoc, parts, max_attempts)
+
+
+def online(parts: Parts, *, max_attempts: int | None = None) -> Online:
+    """After each subtask, by its own outcome (REFLECT, online)."""
+    return _stepping_in(Online, parts, max_attempts, _scoping(parts))
+
+
+def online_scene(parts: Parts, *, max_attempts: int | None = None) -> OnlineScene:
+    """After each subtask, by the scene."""
+    return _stepping_in(OnlineScene, parts, max_attempts, _scoping(parts))
+
+
+def _scoping(parts: Parts) -> Callable[..., Any]:
+    return partial(scope, domain=parts.domain, config=ScopeConfig())
+
+
+def _stepping_in(
+    strategy: Callable[..., S], parts: Parts, max_attempts: int | None, *more: Any
+) -> S:
+    limits = {} if max_attempts is None else {"max_attempts": max_attempts}
+    return strategy(
+        parts.part(RETRIEVER),
+        parts.part(DETECTOR),
+        parts.part(REASONER),
+        parts.part(REPLANNER),
+        parts.part(VALIDATOR),
+        *more,
+        **limits,
+    )
+
+
+def watch(parts: Parts) -> Watch:
+    """Every detector and every ablation of the score judges, the paper's own first."""
+    paper = SceneGraphDetector.name
+    own = [parts.part(DETECTOR, paper, **_shared(parts, paper))]
+    ablated = [
+        parts.part(DETECTOR, paper, **_shared(parts, paper), **{switch: False})
+        for switch in SWITCHES.values()
+    ]
+    others: list[Detector] = [
+        parts.part(DETECTOR, name, **_shared(parts, name))
+        for name in parts.declared(DETECTOR)
+        if name != paper
+    ]
+    return Watch(parts.part(RETRIEVER), [*own, *ablated, *others], parts.part(REASONER))
+
+
+def _shared(parts: Parts, name: str) -> dict[str, Any]:
+    """Options given to the run's detector that another has, too, the ablations apart."""
+    known = parts.declared(DETECTOR, name)
+    return {
+        option: value
+        for option, value in parts.given(DETECTOR).items()
+        if option in known and option not in SWITCHES.values()
+    }

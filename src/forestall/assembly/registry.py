@@ -1,0 +1,225 @@
+"""What can be chosen by name: one table for each kind, loaded only when asked for.
+
+Read by the rest of this package. A part is a factory: a function or a class whose keyword
+parameters are its options (`assembly.options`) and whose first parameter, if it is called `parts`,
+lends it what it needs (`seams.Parts`). Others add theirs by entry point, group "forestall.<kind>",
+for example
+
+    [project.entry-points."forestall.segmenter"]
+    my-segmenter = "my_package.masks:MySegmenter"
+
+or are named where they stand: "my_package.masks:MySegmenter".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points, packages_distributions
+from typing import Any
+
+from forestall import kinds
+from forestall.errors import InputError, UnknownNameError
+from forestall.types.kind import Kind
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The shipped parts of one kind.
+
+    Args:
+        kind: and the Protocol that they implement.
+        default: the one that a run has when nothing is said. It stands only here.
+        targets: name → "module:factory".
+    """
+
+    kind: Kind[Any]
+    default: str
+    targets: Mapping[str, str]
+
+
+_SEEING = "forestall.assembly.seeing"
+_JUDGING = "forestall.assembly.judging"
+_EMBEDDINGS = "forestall.embeddings"
+
+TABLES: Mapping[str, Table] = {
+    table.kind.name: table
+    for table in (
+        Table(kinds.WORLD, "kitchen", {"kitchen": "forestall.worlds.kitchen.part:Kitchens"}),
+        Table(kinds.DOMAIN, "household", {"household": f"{_SEEING}:household"}),
+        Table(
+            kinds.SEGMENTER,
+            "instance-ids",
+            {
+                "instance-ids": f"{_SEEING}:instance_ids",
+                "given-masks": f"{_SEEING}:given_masks",
+            },
+        ),
+        Table(
+            kinds.STATES,
+            "learned",
+            {name: f"{_SEEING}:{name}" for name in ("clip", "given", "learned", "oracle")},
+        ),
+        Table(kinds.PERCEIVER, "graph", {"graph": f"{_SEEING}:graph"}),
+        Table(
+            kinds.TEXT_ENCODER,
+            "hashed-words",
+            {
+                "hashed-words": f"{_EMBEDDINGS}.hashed:HashedTextEncoder",
+                "sentence": f"{_EMBEDDINGS}.sentence:SentenceEncoder",
+                "two-tower": f"{_EMBEDDINGS}.twotower:TwoTowerEncoder",
+            },
+        ),
+        Table(
+            kinds.IMAGE_ENCODER,
+            "two-tower",
+            {
+                "clip": f"{_EMBEDDINGS}.clip:ClipEncoder",
+                "two-tower": f"{_EMBEDDINGS}.twotower:TwoTowerEncoder",
+            },
+        ),
+        Table(
+            kinds.CAPTIONER,
+            "listing",
+            {"blip": f"{_EMBEDDINGS}.captioner:BlipCaptioner", "listing": f"{_SEEING}:listing"},
+        ),
+        Table(kinds.STORE, "sqlite", {"sqlite": f"{_JUDGING}:sqlite"}),
+        Table(kinds.RETRIEVER, "embedding", {"embedding": f"{_JUDGING}:embedding"}),
+        Table(
+            kinds.DETECTOR,
+            "scene-graph",
+            {
+                "caption": f"{_JUDGING}:caption",
+                "image": f"{_JUDGING}:image",
+                "objects": f"{_JUDGING}:objects",
+                "scene-graph": f"{_JUDGING}:scene_graph",
+            },
+        ),
+        Table(
+            kinds.REASONER,
+            "preconditions",
+            {"none": f"{_JUDGING}:no_reasoning", "preconditions": f"{_JUDGING}:preconditions"},
+        ),
+        Table(
+            kinds.REPLANNER,
+            "planner",
+            {"anew": f"{_JUDGING}:anew", "planner": f"{_JUDGING}:planner"},
+        ),
+        Table(
+            kinds.VALIDATOR,
+            "graph",
+            {
+                "accept-all": "forestall.planning.validate:AcceptAll",
+                "graph": f"{_JUDGING}:graph_validator",
+            },
+        ),
+        Table(
+            kinds.STRATEGY,
+            "proactive",
+            {
+                "none": "forestall.strategies.none:NoReplanning",
+                "online": f"{_JUDGING}:online",
+                "online-scene": f"{_JUDGING}:online_scene",
+                "post-hoc": f"{_JUDGING}:post_hoc",
+                "proactive": f"{_JUDGING}:proactive",
+                "watch": f"{_JUDGING}:watch",
+            },
+        ),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A factory and where it comes from.
+
+    Args:
+        kind: of the part.
+        name: of the part.
+        factory: builds it.
+        package: whose it is in words, None for a shipped one.
+    """
+
+    kind: str
+    name: str
+    factory: Callable[..., Any]
+    package: str | None
+
+    @property
+    def text(self) -> str:
+        """Which part is meant, for messages."""
+        of = "" if self.package is None else f" of the package {self.package}"
+        return f"{self.kind} {self.name!r}{of}"
+
+
+def default(kind: Kind[Any]) -> str:
+    """The part of a kind that a run has when nothing is said."""
+    return TABLES[kind.name].default
+
+
+def table(kind: str) -> Table:
+    """The table of a kind.
+
+    Raises:
+        UnknownNameError: no such kind.
+    """
+    if kind not in TABLES:
+        raise UnknownNameError("kind of part", kind, TABLES)
+    return TABLES[kind]
+
+
+def known(kind: str) -> tuple[str, ...]:
+    """Every name of a kind, entry points included."""
+    return tuple(sorted({*table(kind).targets, *(e.name for e in _entries(kind))}))
+
+
+def find(kind: str, name: str) -> Found:
+    """The factory behind a name, or behind "module:attribute".
+
+    Raises:
+        UnknownNameError: no such name.
+        InputError: it is known and cannot be imported.
+    """
+    if (target := table(kind).targets.get(name)) is not None:
+        try:
+            return Found(kind, name, _imported(target), None)
+        except ImportError as error:
+            raise InputError(f"{kind} {name!r} cannot be loaded ({target}): {error}") from error
+    target, package = name, None
+    for entry in _entries(kind):
+        if entry.name == name:
+            target, package = entry.value, _package(entry)
+    if ":" not in target:
+        raise UnknownNameError(kind, name, known(kind))
+    package = package or _owner(target)
+    try:
+        return Found(kind, name, _imported(target), package)
+    except Exception as error:  # somebody else's code: whatever breaks is told with its package
+        raise InputError(
+            f"{kind} {name!r} of the package {package} cannot be loaded ({target}): "
+            f"{type(error).__name__}: {error}"
+        ) from error
+
+
+def _entries(kind: str) -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=f"forestall.{kind}"))
+
+
+def _imported(target: str) -> Callable[..., Any]:
+    module, _, attribute = target.partition(":")
+    try:
+        factory: Callable[..., Any] = getattr(import_module(module), attribute)
+    except AttributeError as error:
+        raise ImportError(f"{module} has no {attribute!r}") from error
+    return factory
+
+
+def _package(entry: EntryPoint) -> str | None:
+    return None if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+
+
+def _owner(target: str) -> str:
+    """The distribution that a module comes from; the module's first name where it has none."""
+    top = target.partition(":")[0].partition(".")[0]
+    return ", ".join(dict.fromkeys(packages_distributions().get(top, [top])))

@@ -1,0 +1,100 @@
+"""Factories of what sees: segmenters, state estimators, the perceiver, the captioner that lists.
+
+Named in `registry`, called through `parts`; calls perception and embeddings.
+"""
+
+from __future__ import annotations
+
+from forestall.assembly.registry import default
+from forestall.comparison.options import Feature, ScoreConfig
+from forestall.domain.load import shipped
+from forestall.domain.model import Domain
+from forestall.embeddings.captions import ListingCaptioner
+from forestall.kinds import IMAGE_ENCODER, SEGMENTER, STATES
+from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.given import GivenStateEstimator
+from forestall.perception.learned import LearnedStateEstimator
+from forestall.perception.oracle import OracleStateEstimator
+from forestall.perception.perceiver import GraphPerceiver
+from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
+from forestall.seams import ImageTextEncoder, Parts
+
+_PERCEPTION, _SCORE = PerceptionConfig(), ScoreConfig()
+
+STATE_ENCODERS = {"learned": default(IMAGE_ENCODER), "clip": "clip"}
+"""The image-text encoder behind each estimator that reads pixels."""
+
+
+def instance_ids(*, min_pixels: int = _PERCEPTION.min_pixels) -> InstanceSegmenter:
+    """The simulator's own masks, of things with enough pixels."""
+    return InstanceSegmenter(PerceptionConfig(min_pixels=min_pixels))
+
+
+def given_masks(*, min_pixels: int = _PERCEPTION.min_pixels) -> GivenMasks:
+    """The masks that a stored observation comes with."""
+    return GivenMasks(PerceptionConfig(min_pixels=min_pixels))
+
+
+def learned(parts: Parts) -> LearnedStateEstimator:
+    """States off pixels, by the shipped encoder."""
+    return _reading(parts, "learned")
+
+
+def clip(parts: Parts) -> LearnedStateEstimator:
+    """States off pixels, by CLIP, whose weights it needs."""
+    return _reading(parts, "clip")
+
+
+def _reading(parts: Parts, name: str) -> LearnedStateEstimator:
+    return LearnedStateEstimator(parts.part(IMAGE_ENCODER, STATE_ENCODERS[name]), parts.domain)
+
+
+def household() -> Domain:
+    """The household that comes with the project."""
+    return shipped("household")
+
+
+def oracle(parts: Parts) -> OracleStateEstimator:
+    """The truth of what a camera could tell."""
+    return OracleStateEstimator(parts.lent("truth").states, parts.domain)
+
+
+def given(parts: Parts) -> GivenStateEstimator:
+    """The states that a stored observation comes with."""
+    return GivenStateEstimator(parts.lent("states"))
+
+
+def graph(
+    parts: Parts,
+    *,
+    feature: Feature = _SCORE.feature,
+    perception: PerceptionConfig | None = None,
+    scope: ScopeConfig | None = None,
+) -> GraphPerceiver:
+    """RGB-D to one scene graph over the episode.
+
+    Args:
+        parts: segmenter, states, encoder, domain.
+        feature: what a node's feature encodes; "image" keeps the look of every object.
+        perception: every threshold.
+        scope: what concerns a subtask.
+    """
+    return GraphPerceiver(
+        parts.part(SEGMENTER),
+        parts.part(STATES),
+        parts.domain,
+        perception,
+        scope,
+        image_encoder=look_encoder(parts) if feature is Feature.IMAGE else None,
+    )
+
+
+def look_encoder(parts: Parts) -> ImageTextEncoder:
+    """The encoder of how objects look: that of their states, where those are read off pixels."""
+    name = STATE_ENCODERS.get(parts.name(STATES), default(IMAGE_ENCODER))
+    return parts.part(IMAGE_ENCODER, name)
+
+
+def listing(parts: Parts) -> ListingCaptioner:
+    """Says in words what perception made of a picture."""
+    return ListingCaptioner(parts.domain)

@@ -1,0 +1,126 @@
+"""Flags that say which parts a command works with, and how their options are spelt.
+
+`--detector.threshold 0.85` is short for `--set detector.threshold=0.85`; every kind of part and
+every option of a part can be said that way, in any command that takes parts. A file (`--config`)
+says the same; flags come over it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from forestall.assembly.configuration import Given
+
+Settings = Annotated[list[str] | None, Parameter(name="--set", negative="")]
+
+_OPTION = re.compile(r"--([a-z][a-z-]*\.[\w-]+)(?:=(.*))?", re.DOTALL)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class SeeingFlags:
+    """What a scene is seen with.
+
+    Args:
+        world: where the robot acts: a name, or package.module:Class.
+        states: where object states come from: learned (pixels, by the shipped encoder), clip
+            (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
+        feature: what a node's feature encodes: text, parts (category and states) or image.
+        renderer: auto, embree, rays or gl.
+        image_encoder: of whole pictures, for the detector image: two-tower or clip.
+        captioner: of whole pictures, for the detector caption: listing or blip.
+        config: a TOML file with a table for each kind of part; flags come over it.
+        settings: one option of a part; --detector.threshold 0.85 is short for
+            --set detector.threshold=0.85 (see `forestall parts`).
+    """
+
+    world: str | None = None
+    states: str | None = None
+    feature: str | None = None
+    renderer: str | None = None
+    image_encoder: str | None = None
+    captioner: str | None = None
+    config: Path | None = None
+    settings: Settings = None
+
+    def given(self) -> Given:
+        """What flags and file say of the parts.
+
+        Raises:
+            InputError: an option that is not spelt right, or a file that is none.
+        """
+        return self.read()[0]
+
+    def read(self) -> tuple[Given, dict[str, Any]]:
+        """As `given`, and what else the file says of a run."""
+        from forestall.assembly.configuration import Given, read_file
+
+        named = {
+            f.name: getattr(self, f.name)
+            for f in fields(self)
+            if f.name not in ("config", "settings")
+        }
+        flags = Given.said(self.settings or ()).over(Given.named(named))
+        if self.config is None:
+            return flags, {}
+        below, run = read_file(self.config)
+        return flags.over(below), run
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class ComparingFlags(SeeingFlags):
+    """What a scene is compared with, besides.
+
+    Args:
+        encoder: of texts, for references and node features: hashed-words, two-tower, sentence.
+        memory: a demonstration file; the ready-made one of the task by default.
+    """
+
+    encoder: str | None = None
+    memory: Path | None = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class RunFlags(ComparingFlags):
+    """Who judges and steps in, besides.
+
+    Args:
+        strategy: when a run may be interrupted: none, proactive, online, online-scene, post-hoc;
+            watch lets every detector judge and never interrupts.
+        detector: of a strategy that steps in: scene-graph, objects, caption or image.
+        threshold: alarm when no demonstration reaches this score.
+    """
+
+    strategy: str | None = None
+    detector: str | None = None
+    threshold: float | None = None
+
+
+def spelt(arguments: Iterable[str]) -> Iterator[str]:
+    """Arguments with `--kind.option value` written as `--set kind.option=value`."""
+    waiting: str | None = None
+    for argument in arguments:
+        if waiting is not None:
+            yield f"{waiting}={argument}"
+            waiting = None
+            continue
+        found = _OPTION.fullmatch(argument)
+        if found is None:
+            yield argument
+            continue
+        yield "--set"
+        if found[2] is None:
+            waiting = found[1]
+        else:
+            yield f"{found[1]}={found[2]}"
+    if waiting is not None:
+        yield waiting

@@ -1,0 +1,47 @@
+"""`forestall parts`: what can be chosen by name, and the options of each part."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+
+def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
+    """List the parts of a run by kind, or one kind's with every option and its default.
+
+    Args:
+        kind: only this kind, e.g. detector; with options.
+        as_json: print JSON, always with options.
+    """
+    from forestall.assembly.registry import TABLES, known, table
+
+    if not as_json and kind is None:
+        for name, of in TABLES.items():
+            others = [n for n in known(name) if n != of.default]
+            print(f"{name}: {', '.join([f'{of.default} (default)', *others])}")
+        return 0
+    wanted = list(TABLES) if kind is None else [table(kind).kind.name]
+    if as_json:
+        print(json.dumps({k: {n: _options(k, n) for n in known(k)} for k in wanted}, indent=2))
+        return 0
+    for name in known(wanted[0]):
+        mark = " (default)" if name == table(wanted[0]).default else ""
+        print(f"{name}{mark}")
+        for option, value in sorted(_options(wanted[0], name).items()):
+            print(f"  --{wanted[0]}.{option} {value}")
+    return 0
+
+
+def _options(kind: str, name: str) -> dict[str, object]:
+    """Every option of a part with its default, None where it has none."""
+    from dataclasses import MISSING
+
+    from forestall.assembly.options import declared, plain
+    from forestall.assembly.registry import find
+
+    options = declared(find(kind, name).factory).options.values()
+    return {o.name: None if o.default is MISSING else plain(o.default) for o in options}

@@ -1,0 +1,42 @@
+"""Every kind of part of a run, typed by its Protocol.
+
+Read by `assembly`, which has a table of names for each, and by factories, which ask their `Parts`
+for other parts by kind.
+"""
+
+from __future__ import annotations
+
+from forestall.domain.model import Domain
+from forestall.seams import (
+    Captioner,
+    DemonstrationStore,
+    Detector,
+    ImageTextEncoder,
+    Perceiver,
+    PlanValidator,
+    Reasoner,
+    Replanner,
+    Retriever,
+    Segmenter,
+    StateEstimator,
+    Strategy,
+    TextEncoder,
+    WorldPart,
+)
+from forestall.types.kind import Kind
+
+WORLD = Kind[WorldPart]("world", WorldPart)
+DOMAIN = Kind[Domain]("domain", Domain)
+SEGMENTER = Kind[Segmenter]("segmenter", Segmenter)
+STATES = Kind[StateEstimator]("states", StateEstimator)
+PERCEIVER = Kind[Perceiver]("perceiver", Perceiver)
+TEXT_ENCODER = Kind[TextEncoder]("text-encoder", TextEncoder)
+IMAGE_ENCODER = Kind[ImageTextEncoder]("image-encoder", ImageTextEncoder)
+CAPTIONER = Kind[Captioner]("captioner", Captioner)
+STORE = Kind[DemonstrationStore]("store", DemonstrationStore)
+RETRIEVER = Kind[Retriever]("retriever", Retriever)
+DETECTOR = Kind[Detector]("detector", Detector)
+REASONER = Kind[Reasoner]("reasoner", Reasoner)
+REPLANNER = Kind[Replanner]("replanner", Replanner)
+VALIDATOR = Kind[PlanValidator]("validator", PlanValidator)
+STRATEGY = Kind[Strategy]("strategy", Strategy)

@@ -1,0 +1,84 @@
+"""The embedded household as the world part of a run (`seams.WorldPart`).
+
+Built by `assembly`; makes kitchens, and remembers what was drawn where many runs follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from forestall.domain.model import Domain
+from forestall.errors import UnknownNameError
+from forestall.types.scene import SceneNeeds
+from forestall.types.world import Working
+from forestall.worlds.kitchen.environment import KitchenEnvironment, KitchenOracle
+from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
+
+
+@dataclass(frozen=True, slots=True)
+class OpenKitchen:
+    """Implements `OpenWorld`."""
+
+    environment: KitchenEnvironment
+
+    @property
+    def oracle(self) -> KitchenOracle:
+        """The truth of the kitchen."""
+        return self.environment.oracle
+
+    @property
+    def disturbance(self) -> KitchenEnvironment:
+        """The kitchen itself: it can let fall what the robot holds."""
+        return self.environment
+
+
+class Kitchens:
+    """Implements `WorldPart`.
+
+    Args:
+        renderer: "auto", "embree", "rays" or "gl".
+
+    Raises:
+        UnknownNameError: no such renderer.
+    """
+
+    name = "kitchen"
+
+    def __init__(self, renderer: str = "auto") -> None:
+        if renderer not in RENDERERS:
+            raise UnknownNameError("renderer", renderer, RENDERERS)
+        self._renderer = renderer
+        self._frames = FrameMemory()
+
+    @contextmanager
+    def open(
+        self, needs: SceneNeeds, domain: Domain, remember: bool = False
+    ) -> Iterator[OpenKitchen]:
+        """See the Protocol."""
+        frames = self._frames if remember else None
+        kitchen = KitchenEnvironment(needs, domain, self._renderer, frames=frames)
+        try:
+            yield OpenKitchen(kitchen)
+        finally:
+            kitchen.close()
+
+    def check(self) -> Sequence[Working]:
+        """A picture without a graphics library is needed; one renderer suffices."""
+        from forestall.worlds.kitchen.rendering.probe import probe_renderers
+
+        probes = {p.name: p for p in probe_renderers()}
+        working = [p for n, p in probes.items() if n != "gl" and p.works]
+        picture = Working(
+            "picture without a graphics library",
+            bool(working),
+            True,
+            ", ".join(f"{p.name} ({p.detail})" for p in working) or "no software renderer works",
+            "pip install --force-reinstall embreex mujoco-core",
+        )
+        single = [
+            Working(f"renderer {p.name}", p.works, False, p.detail, p.hint)
+            for p in (probes[n] for n in ("embree", "rays", "gl") if n in probes)
+        ]
+        return (picture, *single)
