@@ -143,7 +143,7 @@ def test_a_further_thing_moves_nothing_else():
 
 def test_a_relation_is_what_predicates_or_skills_say():
     assert relation_at(BENCH, "Nut-1", "Bolt-1") == "threaded_on"
-    assert relation_at(BENCH, "Nut-1", "PartsBox-1") == "lies_in"
+    assert relation_at(BENCH, "Nut-1", "PartsBox-1") == "lying_in"
     assert relation_at(HOUSEHOLD, "Mug-1", "CounterTop-1") == "on_top_of"
     assert relation_at(HOUSEHOLD, "Mug-1", "Fridge-1") == "inside"
     with pytest.raises(InputError, match="no relation of bench says"):
@@ -155,12 +155,12 @@ def test_a_thing_is_not_put_where_nothing_takes_it():
         start_scene(BENCH, SceneNeeds(objects=(ObjectNeed("Cloth-1", "Cloth", ("PartsBox",)),)), 0)
 
 
-def test_what_is_dropped_lies_on_the_ground():
+def test_what_is_dropped_lying_on_the_ground():
     world = SymbolicWorld(BENCH, BENCH_NEEDS)
     _run(world, "pick(Bolt)")
     assert world.drop_held() == "Bolt-1"
     assert world.drop_held() is None
-    assert "lies_on(Bolt-1, Floor-1)" in {e.text for e in world.events()}
+    assert "lying_on(Bolt-1, Floor-1)" in {e.text for e in world.events()}
 
 
 def test_what_is_dropped_where_there_is_no_ground_is_lost():
