@@ -1,7 +1,8 @@
 """Every check of the project in one command: `python check.py`.
 
-Formatting, linting, types, import contracts, tests. `python check.py tests -k memory` runs the
-tests alone and hands the rest to pytest.
+Formatting, linting, types, import contracts, tests. `python check.py fast` leaves out the tests
+that draw in the simulator or take long: the check before every commit. `python check.py tests -k
+memory` runs the tests alone and hands the rest to pytest.
 """
 
 import subprocess
@@ -16,21 +17,25 @@ CHECKS = {
     "tests": ["-m", "pytest", "-n", "auto", "--dist", "loadgroup"],
 }
 
+FAST = {**CHECKS, "tests": [*CHECKS["tests"], "-m", "not slow and not simulator"]}
+
 
 def main(arguments: list[str]) -> int:
     """Run the named check, or all; every one runs even when an earlier one failed."""
-    chosen = {arguments[0]: CHECKS[arguments[0]]} if arguments else CHECKS
+    name, *rest = arguments or ["all"]
+    groups = {"all": CHECKS, "fast": FAST}
+    checks = groups.get(name) or {name: CHECKS[name]}
     failed = []
-    for name, command in chosen.items():
+    for check, command in checks.items():
         started = time.monotonic()
-        print(f"== {name}", flush=True)
-        done = subprocess.run([sys.executable, *command, *arguments[1:]], check=False)
+        print(f"== {check}", flush=True)
+        done = subprocess.run([sys.executable, *command, *rest], check=False)
         passed = done.returncode == 0
         seconds = time.monotonic() - started
-        print(f"== {name}: {'ok' if passed else 'FAILED'} ({seconds:.0f} s)", flush=True)
+        print(f"== {check}: {'ok' if passed else 'FAILED'} ({seconds:.0f} s)", flush=True)
         if not passed:
-            failed.append(name)
-    if not arguments:
+            failed.append(check)
+    if name in groups:
         print("all checks passed" if not failed else f"failed: {', '.join(failed)}", flush=True)
     return 1 if failed else 0
 

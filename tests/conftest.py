@@ -1,4 +1,4 @@
-"""Shared by all tests: no test touches the user's cache."""
+"""Shared by all tests: no test touches the user's cache; those of a world are marked."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,3 +12,10 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     folder = tmp_path / "cache"
     monkeypatch.setenv("FORESTALL_CACHE", str(folder))
     yield folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What lies under `worlds` needs the simulator."""
+    for item in items:
+        if "worlds" in item.path.relative_to(Path(__file__).parent).parts:
+            item.add_marker("simulator")

@@ -48,5 +48,5 @@ def test_the_example_files_are_valid(tmp_path: Path) -> None:
     config = run_config(str(tmp_path / "task.toml"), str(tmp_path / "scenario.toml"))
     assert prepare(config).loaded.task.name == "fetch-ladle"
     (tmp_path / "with-attribute.toml").write_text(task + attributes)
-    words = prepare(run_config(str(tmp_path / "with-attribute.toml"))).loaded.vocabulary
+    words = prepare(run_config(str(tmp_path / "with-attribute.toml"))).loaded.domain
     assert words.phrases("Tomato", "ripe", "unripe") == ("an unripe tomato", "a green tomato")

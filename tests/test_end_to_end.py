@@ -173,8 +173,8 @@ def test_a_stored_observation_is_judged(
 ) -> None:
     loaded = load_task("heat-potato")
     for name, faults in (("fine", ()), ("full", load_scenario("microwave-occupied").faults)):
-        needs = apply_scene_faults(loaded.task.scene, faults, loaded.vocabulary)
-        kitchen = KitchenEnvironment(needs, loaded.vocabulary)
+        needs = apply_scene_faults(loaded.task.scene, faults, loaded.domain)
+        kitchen = KitchenEnvironment(needs, loaded.domain)
         kitchen.reset(14)
         for subtask in loaded.task.plan.subtasks[:8]:
             kitchen.execute(subtask)

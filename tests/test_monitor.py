@@ -7,10 +7,17 @@ from dataclasses import replace
 
 import pytest
 
+from forestall.assembly.make import make_strategy
 from forestall.conclusion import MonitorConfig
+from forestall.domain.load import shipped
 from forestall.errors import InputError, PerceptionError
 from forestall.monitor import Monitor
+from forestall.perception.config import ScopeConfig
+from forestall.perception.scope import scope
 from forestall.strategies.none import NoReplanning
+from forestall.tasks.faults import apply_scene_faults
+from forestall.tasks.files import load_scenario, load_task
+from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.decision import Hold, Outcome
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import GRIPPER, Literal
@@ -25,7 +32,8 @@ from forestall.types.verdict import (
     ReplanOutcome,
     Verdict,
 )
-from forestall.vocabulary import household
+from forestall.worlds.kitchen.flat_world import flat_environment
+from test_runtime import memory
 
 PLAN = Plan.parse(["pick_up(Mug)", "put_in(Mug, Sink)"], "a mug in the sink")
 DONE = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)
@@ -88,7 +96,7 @@ class Scripted:
 
 def started(*answers: StrategyAnswer, **config: object) -> tuple[Monitor, Scripted]:
     strategy = Scripted(*answers)
-    monitor = Monitor(strategy, household(), config=MonitorConfig(**config))  # type: ignore[arg-type]
+    monitor = Monitor(strategy, shipped("household"), config=MonitorConfig(**config))  # type: ignore[arg-type]
     monitor.start(PLAN)
     return monitor, strategy
 
@@ -150,7 +158,7 @@ def test_what_was_not_judged_is_not_said_to_proceed(
 
 
 def test_holding_is_the_default_and_the_caller_may_overrule_it() -> None:
-    monitor = Monitor(NoReplanning(), household())
+    monitor = Monitor(NoReplanning(), shipped("household"))
     monitor.start(PLAN)
     decision = monitor.before(scene())
     assert (decision.outcome, decision.may_start) == (Outcome.NOT_JUDGED, False)
@@ -266,7 +274,7 @@ def test_a_refusal_unbinds_and_its_reason_is_not_told() -> None:
 
 def test_what_a_subtask_has_led_to_is_looked_at_where_the_strategy_wants_it() -> None:
     strategy = Scripted(GO, LOOK, GO, looks_after=LooksAfter.SUBTASK)
-    monitor = Monitor(strategy, household())
+    monitor = Monitor(strategy, shipped("household"))
     monitor.start(PLAN)
     monitor.before(scene())
     let_go = replace(DONE, hand_world_m=(5.0, 5.0, 1.0))
@@ -286,7 +294,7 @@ def test_what_a_subtask_has_led_to_is_looked_at_where_the_strategy_wants_it() ->
 
 def test_the_end_is_looked_at_where_the_strategy_wants_it() -> None:
     strategy = Scripted(GO, GO, REPLAN, looks_after=LooksAfter.EPISODE)
-    monitor = Monitor(strategy, household())
+    monitor = Monitor(strategy, shipped("household"))
     monitor.start(PLAN)
     for held in (None, "Mug-2"):
         monitor.before(scene(held))
@@ -298,7 +306,7 @@ def test_the_end_is_looked_at_where_the_strategy_wants_it() -> None:
 
 
 def nothing_started(monitor: Monitor) -> object:
-    return Monitor(Scripted(), household()).before(scene())
+    return Monitor(Scripted(), shipped("household")).before(scene())
 
 
 @pytest.mark.parametrize(
@@ -333,7 +341,7 @@ def test_an_error_in_a_part_comes_out_as_it_is() -> None:
         def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
             raise PerceptionError("the camera is gone")
 
-    monitor = Monitor(Broken(), household(), config=MonitorConfig(on_not_judged="proceed"))
+    monitor = Monitor(Broken(), shipped("household"), config=MonitorConfig(on_not_judged="proceed"))
     monitor.start(PLAN)
     with pytest.raises(PerceptionError, match="camera"):
         monitor.before(scene())
@@ -355,3 +363,36 @@ def test_starting_again_forgets() -> None:
 def test_a_policy_or_a_bound_that_cannot_be(config: dict[str, object]) -> None:
     with pytest.raises(InputError, match=next(iter(config))):
         MonitorConfig(**config)  # type: ignore[arg-type]
+
+
+def test_the_real_strategy_on_graphs_of_the_callers_own() -> None:
+    """An executive that owns the robot: the microwave is occupied, and is emptied first."""
+    loaded = load_task("heat-potato")
+    faults = load_scenario("microwave-occupied").faults
+    needs = apply_scene_faults(loaded.task.scene, faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    kitchen.reset(3)
+    monitor = Monitor(
+        make_strategy(run_config("heat-potato", seed=3), loaded.domain, memory()),
+        loaded.domain,
+        config=MonitorConfig(on_alarm="proceed"),
+        scope=lambda graph, subtask: scope(graph, subtask, loaded.domain, ScopeConfig()),
+    )
+    monitor.start(loaded.task)
+    outcomes = []
+    while not monitor.finished:
+        place = monitor.approach()
+        if place is not None:
+            kitchen.approach(place)
+        decision = monitor.before(kitchen.oracle.truth())
+        outcomes.append(decision.outcome)
+        if decision.may_start:
+            assert decision.command is not None
+            monitor.after(kitchen.execute(decision.command))
+        else:
+            assert decision.outcome is Outcome.REPLAN, decision.why
+            assert decision.diagnosis is not None and "Bowl-1" in decision.diagnosis.cause
+    assert outcomes.count(Outcome.REPLAN) == 1
+    assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in monitor.executed)
+    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    assert strict, why

@@ -34,7 +34,6 @@ from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.verdict import Decision, ReplanOutcome
-from forestall.vocabulary import Vocabulary
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
@@ -45,9 +44,9 @@ ON_FLAT_WORLDS = sorted(set(scenario_names("examples")) - {"knife-blocked"})
 class TruthPerceiver:
     """Perception that is always right."""
 
-    def __init__(self, kitchen: KitchenEnvironment, vocabulary: Vocabulary) -> None:
+    def __init__(self, kitchen: KitchenEnvironment, domain: Domain) -> None:
         self._kitchen = kitchen
-        self._vocabulary = vocabulary
+        self._domain = domain
 
     def reset(self) -> None:
         pass
@@ -56,7 +55,7 @@ class TruthPerceiver:
         return self._kitchen.oracle.truth()
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
-        return scope(graph, subtask, self._vocabulary, ScopeConfig())
+        return scope(graph, subtask, self._domain, ScopeConfig())
 
     def describe(self) -> Mapping[str, str]:
         return {"segmenter": "truth", "state_estimator": "truth"}
@@ -70,21 +69,21 @@ def play(
 ) -> EpisodeRecord:
     loaded = load_task(config.task)
     faults = () if config.scenario is None else load_scenario(config.scenario).faults
-    needs = apply_scene_faults(loaded.task.scene, faults, loaded.vocabulary)
-    kitchen = flat_environment(needs, loaded.vocabulary)
+    needs = apply_scene_faults(loaded.task.scene, faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
 
     def score(record: EpisodeRecord) -> EpisodeRecord:
-        strict, weak, why = TruthGoalChecker().check(record.task.goal, kitchen.oracle)
+        strict, weak, why = TruthGoalChecker(loaded.domain).check(record.task.goal, kitchen.oracle)
         return replace(record, success=strict, weak_success=weak, failures=why)
 
     runtime = Runtime(
-        wrap(kitchen, faults, kitchen, loaded.vocabulary),
-        perceiver(kitchen, loaded.vocabulary),
-        make_strategy(config, loaded.vocabulary, demonstrations),
-        loaded.vocabulary,
+        wrap(kitchen, faults, kitchen, loaded.domain),
+        perceiver(kitchen, loaded.domain),
+        make_strategy(config, loaded.domain, demonstrations),
+        loaded.domain,
         config=limits,
     )
-    plan = apply_plan_faults(loaded.task.plan, faults)
+    plan = apply_plan_faults(loaded.task.plan, faults, loaded.domain)
     return runtime.run(loaded.task, plan, config.seed, config.scenario, score)
 
 
@@ -189,10 +188,10 @@ def test_an_error_in_the_middle_is_recorded() -> None:
             return super().perceive(observation)
 
     loaded = load_task("make-coffee")
-    kitchen = flat_environment(loaded.task.scene, loaded.vocabulary)
+    kitchen = flat_environment(loaded.task.scene, loaded.domain)
     config = run_config("make-coffee", strategy="none")
-    strategy = make_strategy(config, loaded.vocabulary, None)
-    runtime = Runtime(kitchen, Broken(kitchen, loaded.vocabulary), strategy, loaded.vocabulary)
+    strategy = make_strategy(config, loaded.domain, None)
+    runtime = Runtime(kitchen, Broken(kitchen, loaded.domain), strategy, loaded.domain)
     record = runtime.run(loaded.task, loaded.task.plan, 0)
     assert record.end is EpisodeEnd.ERROR
     assert record.failures == ("the run broke off: the camera is gone",)
@@ -280,7 +279,7 @@ def test_a_moment_after_a_subtask_shares_its_index_and_the_end_has_its_own() -> 
 
 def test_why_a_skill_was_refused_is_recorded_and_not_told() -> None:
     loaded = load_task("heat-potato")
-    kitchen = flat_environment(loaded.task.scene, loaded.vocabulary)
+    kitchen = flat_environment(loaded.task.scene, loaded.domain)
     told = []
 
     class Curious(NoReplanning):
@@ -288,8 +287,8 @@ def test_why_a_skill_was_refused_is_recorded_and_not_told() -> None:
             told.append(outcome)
             return super().after_subtask(context, outcome)
 
-    perceiver = TruthPerceiver(kitchen, loaded.vocabulary)
-    runtime = Runtime(kitchen, perceiver, Curious(), loaded.vocabulary)
+    perceiver = TruthPerceiver(kitchen, loaded.domain)
+    runtime = Runtime(kitchen, perceiver, Curious(), loaded.domain)
     record = runtime.run(loaded.task, Plan.parse(["pick_up(Microwave)"]), 0)
     (step,) = record.executed
     assert step.outcome.status is told[0].status is SkillStatus.REFUSED

@@ -108,7 +108,7 @@ def seen(loaded: LoadedTask, **states: str) -> SceneGraph:
         detections=(Detection("Tomato", mask, "Tomato-1"),),
     )
     perceiver = GraphPerceiver(
-        GivenMasks(), GivenStateEstimator({"Tomato-1": states}), loaded.vocabulary
+        GivenMasks(), GivenStateEstimator({"Tomato-1": states}), loaded.domain
     )
     observation = Observation((frame,), GripperState(None, (0.0, 0.2, 1.0)), 0.0, (0.0, 0.0, 0.0))
     return replace(perceiver.perceive(observation), subtask=PICK_UP)
@@ -138,7 +138,7 @@ def test_it_is_mined_as_what_this_task_needs(loaded: LoadedTask) -> None:
     references = [Reference(f"d{k}", "fetch-tomato", 1, PICK_UP, 1.0, graph) for k in range(4)]
 
     def texts(task: str) -> set[str]:
-        mined = mine(references, loaded.vocabulary, subtask=PICK_UP, task=task)
+        mined = mine(references, loaded.domain, subtask=PICK_UP, task=task)
         return {str(p.literal) for p in mined}
 
     assert "ripe(?object)=ripe" in texts("fetch-tomato")
@@ -156,10 +156,10 @@ def test_planning_takes_it_as_a_fact_that_no_skill_changes(loaded: LoadedTask) -
         tomato = ObjectNode("Tomato-1", "Tomato", (("ripe", value),))
         on_counter = [Relation(n, "on_top_of", "CounterTop-1") for n in ("Tomato-1", "Knife-1")]
         graph = SceneGraph((*fixtures, knife, tomato), tuple(on_counter))
-        check = GraphValidator(loaded.vocabulary).check(loaded.task.plan, graph, loaded.task.goal)
+        check = GraphValidator(loaded.domain).check(loaded.task.plan, graph, loaded.task.goal)
         assert check.ok is ok
         assert [str(x) for x in check.unmet] == ([] if ok else ["ripe(Tomato-1)=ripe"])
-        state: object = State.from_graph(graph, loaded.vocabulary)
+        state: object = State.from_graph(graph, loaded.domain)
         for step in ("pick_up(Knife)", "slice_obj(Tomato)"):
             assert isinstance(state, State)
             state = apply(state, Subtask.parse(step))
@@ -168,13 +168,13 @@ def test_planning_takes_it_as_a_fact_that_no_skill_changes(loaded: LoadedTask) -
 
 
 def test_the_household_keeps_it(loaded: LoadedTask) -> None:
-    kitchen = flat_environment(loaded.task.scene, loaded.vocabulary)
+    kitchen = flat_environment(loaded.task.scene, loaded.domain)
     kitchen.reset(0)
     assert kitchen.oracle.states("Tomato-1")["ripe"] == "ripe"
     tomato = kitchen.oracle.truth().get("Tomato-1")
     assert tomato is not None
     assert tomato.state("heavy") == "light"
-    hidden = [a.name for a in loaded.vocabulary.attributes.values() if not a.camera]
+    hidden = [a.name for a in loaded.domain.attributes.values() if not a.camera]
     estimator = OracleStateEstimator(kitchen.oracle.states, not_visible=hidden)
     mask = np.ones((20, 20), dtype=np.bool_)
     frame = kitchen.observe().frames[0]
@@ -204,7 +204,7 @@ def test_a_run_names_it_as_the_cause(task: str, tmp_path: Path) -> None:
 
 
 def test_a_memory_that_knows_more_attributes_does_no_harm(loaded: LoadedTask) -> None:
-    plain = load_task("make-salad").vocabulary
+    plain = load_task("make-salad").domain
     graph = seen(loaded, ripe="ripe", sliced="whole")
     references = [Reference(f"d{k}", "fetch-tomato", 1, PICK_UP, 1.0, graph) for k in range(4)]
     mined = mine(references, plain, subtask=PICK_UP, task="fetch-tomato")

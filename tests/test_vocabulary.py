@@ -7,14 +7,13 @@ from forestall.vocabulary import (
     ATTRIBUTES,
     Attribute,
     Category,
-    household,
     parse_attribute,
     parse_category,
 )
 
 
 def test_every_reference_inside_the_vocabulary_exists() -> None:
-    words = household()
+    words = shipped("household")
     for category in words.categories.values():
         r = category.receptacle
         named = [*(r.accepts if r else ()), *(r.refuses if r else ())]
@@ -41,11 +40,11 @@ def test_every_reference_inside_the_vocabulary_exists() -> None:
     ],
 )
 def test_what_goes_where(place: str, thing: str, taken: bool) -> None:
-    assert household().accepts(place, thing) is taken
+    assert shipped("household").accepts(place, thing) is taken
 
 
 def test_defaults_and_aliases() -> None:
-    words = household()
+    words = shipped("household")
     assert words.default_states("WineBottle-1")["filled"] == "wine"
     assert words.canonical("SinkBasin-2") == "Sink-2"
     assert words.encloses("Fridge") and not words.encloses("Bowl")
@@ -55,9 +54,9 @@ def test_defaults_and_aliases() -> None:
 
 def test_a_new_category_is_taken_where_anything_is() -> None:
     spoon = parse_category("Ladle", {"pickupable": True, "attributes": ["dirty"]})
-    words = household().extended({"Ladle": spoon})
+    words = shipped("household").extended({"Ladle": spoon})
     assert words.accepts("CounterTop", "Ladle")
-    assert "Ladle" not in household().categories
+    assert "Ladle" not in shipped("household").categories
 
 
 @pytest.mark.parametrize(
@@ -84,13 +83,13 @@ RIPE = {"values": ["unripe", "ripe"], "phrases": {"ripe": ["a red {thing}", "a r
 
 
 def test_the_shipped_attributes_are_those_of_the_constant() -> None:
-    found = {name: a.values for name, a in household().attributes.items()}
+    found = {name: a.values for name, a in shipped("household").attributes.items()}
     assert list(found.items()) == list(ATTRIBUTES.items())
-    assert [a.name for a in household().attributes.values() if not a.camera] == ["temperature"]
+    assert [a.name for a in shipped("household").attributes.values() if not a.camera] == ["temperature"]
 
 
 def test_every_shipped_value_has_several_plain_and_different_phrases() -> None:
-    words = household()
+    words = shipped("household")
     for category in words.categories.values():
         for attribute in category.attributes:
             told = {v: words.phrases(category.name, attribute, v) for v in words.values(attribute)}
@@ -107,7 +106,7 @@ def test_every_shipped_value_has_several_plain_and_different_phrases() -> None:
 
 def test_synonyms_belong_to_one_category() -> None:
     owners: dict[str, str] = {}
-    for category in household().categories.values():
+    for category in shipped("household").categories.values():
         assert 2 <= len(category.synonyms) <= 5
         for name in (category.words, *category.synonyms):
             assert owners.setdefault(name, category.name) == category.name, name
@@ -128,22 +127,22 @@ def test_synonyms_belong_to_one_category() -> None:
 def test_the_first_phrase_is_the_plain_one(
     category: str, attribute: str, value: str, first: str
 ) -> None:
-    assert household().phrases(category, attribute, value)[0] == first
+    assert shipped("household").phrases(category, attribute, value)[0] == first
 
 
 def test_phrases_of_what_is_not_there() -> None:
     with pytest.raises(UnknownNameError, match="known: closed, open"):
-        household().phrases("Mug", "open", "ajar")
+        shipped("household").phrases("Mug", "open", "ajar")
     with pytest.raises(UnknownNameError, match="attribute 'opened': did you mean open"):
-        household().phrases("Mug", "opened", "open")
+        shipped("household").phrases("Mug", "opened", "open")
     with pytest.raises(UnknownNameError, match="Mikrowave"):
-        household().phrases("Mikrowave", "open", "open")
+        shipped("household").phrases("Mikrowave", "open", "open")
 
 
 def test_a_new_attribute_with_its_phrases() -> None:
-    tomato = household()["Tomato"]
+    tomato = shipped("household")["Tomato"]
     spoon = Category("OldSpoon", attributes=("ripe",))
-    words = household().extended(
+    words = shipped("household").extended(
         {"Tomato": tomato, "OldSpoon": spoon}, {"ripe": parse_attribute("ripe", RIPE)}
     )
     assert words.values("ripe") == ("unripe", "ripe")
@@ -152,31 +151,31 @@ def test_a_new_attribute_with_its_phrases() -> None:
     assert words.phrases("OldSpoon", "ripe", "unripe") == ("an unripe old spoon",)
     assert words.default_states("OldSpoon-1") == {"ripe": "unripe"}
     assert words.lasting == ("temperature", "cooked", "ripe")
-    assert "ripe" not in household().attributes
+    assert "ripe" not in shipped("household").attributes
 
 
 def test_other_phrases_for_a_known_attribute() -> None:
-    known = household().attributes["open"]
+    known = shipped("household").attributes["open"]
     table = {"phrases": {"open": ["an {thing} ajar"]}, "by_category": {"Book": {"open": ["pages"]}}}
-    changed = household().extended({}, {"open": parse_attribute("open", table, known)})
+    changed = shipped("household").extended({}, {"open": parse_attribute("open", table, known)})
     assert changed.phrases("Fridge", "open", "open") == ("a fridge ajar",)
     assert changed.phrases("Book", "open", "open") == ("pages",)
     for category, value in (("Fridge", "closed"), ("Book", "closed"), ("Laptop", "open")):
-        before = household().phrases(category, "open", value)
+        before = shipped("household").phrases(category, "open", value)
         assert changed.phrases(category, "open", value) == before
-    assert known == household().attributes["open"]
+    assert known == shipped("household").attributes["open"]
 
 
 def test_a_known_category_is_added_to() -> None:
     table = {"attributes": ["ripe"], "synonyms": ["love apple"], "defaults": {"ripe": "ripe"}}
     values = {**ATTRIBUTES, "ripe": ("unripe", "ripe")}
-    before = household()["Tomato"]
+    before = shipped("household")["Tomato"]
     tomato = parse_category("Tomato", table, values, before)
     assert tomato.attributes == (*before.attributes, "ripe")
     assert tomato.synonyms == (*before.synonyms, "love apple")
     assert (tomato.words, tomato.slices_into) == ("tomato", "TomatoSliced")
     assert dict(tomato.defaults) == {"ripe": "ripe"}
-    bottle = parse_category("WineBottle", {"fragile": True}, values, household()["WineBottle"])
+    bottle = parse_category("WineBottle", {"fragile": True}, values, shipped("household")["WineBottle"])
     assert bottle.fragile and dict(bottle.defaults) == {"filled": "wine"}
 
 
@@ -222,7 +221,7 @@ def test_bad_attributes(name: str, table: dict[str, object], says: str) -> None:
 
 
 def test_values_of_a_known_attribute_stay() -> None:
-    known = household().attributes["open"]
+    known = shipped("household").attributes["open"]
     with pytest.raises(InputError, match=r"open exists: its values \(closed, open\)"):
         parse_attribute("open", {"values": ["closed", "ajar", "open"]}, known)
     with pytest.raises(InputError, match="camera = true stay"):
@@ -233,7 +232,7 @@ def test_values_of_a_known_attribute_stay() -> None:
 def test_phrases_for_a_category_that_does_not_exist() -> None:
     ripe = parse_attribute("ripe", {**RIPE, "by_category": {"Tomatoe": {"ripe": ["red"]}}})
     with pytest.raises(UnknownNameError, match=r"by_category of attribute ripe.*mean Tomato"):
-        household().extended({}, {"ripe": ripe})
+        shipped("household").extended({}, {"ripe": ripe})
 
 
 @pytest.mark.parametrize(
@@ -247,4 +246,4 @@ def test_phrases_for_a_category_that_does_not_exist() -> None:
 )
 def test_articles(template: str, text: str) -> None:
     odd = Attribute("odd", ("no", "yes"), {"yes": (template,)})
-    assert household().extended({}, {"odd": odd}).phrases("Apple", "odd", "yes") == (text,)
+    assert shipped("household").extended({}, {"odd": odd}).phrases("Apple", "odd", "yes") == (text,)

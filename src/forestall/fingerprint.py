@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 _ROOT = Path(__file__).parent
@@ -22,6 +23,12 @@ COUNTING = (
     "sweep", "tables",
 )  # fmt: skip
 """Modules of the statistics that count what was run."""
+
+
+def weights_of(names: Iterable[str]) -> list[tuple[str, str]]:
+    """Which weights of others are meant by parts that read some: FORESTALL_CLIP for "clip"."""
+    found = ((name, os.environ.get(f"FORESTALL_{name.upper()}")) for name in sorted(set(names)))
+    return [(name, folder) for name, folder in found if folder]
 
 
 def sources_digest(extra: Sequence[object] = (), but: Sequence[str] = ()) -> str:

@@ -116,8 +116,20 @@ class Runtime:
             score: fills success and history after the run; it alone sees the truth.
             provenance: configuration, versions and the like, for the record.
         """
+        known = (*provenance, ("perception", self._perceiver.describe()))
+        record = EpisodeRecord(
+            task=task,
+            scenario=scenario,
+            strategy=self._strategy.name,
+            seed=seed,
+            initial_plan=plan,
+            boundaries=(),
+            executed=(),
+            end=EpisodeEnd.UNFINISHED,
+            provenance=tuple((name, plain(value)) for name, value in known),
+        )
         for listener in self._listeners:
-            listener.on_start(task, plan, seed)
+            listener.on_start(record)
         monitor, episode = self._monitor, _Episode()
         end, broken = EpisodeEnd.ERROR, None
         try:
@@ -129,12 +141,8 @@ class Runtime:
             end = self._loop(episode)
         except Exception as error:  # noqa: BLE001 - whatever breaks, what came before is kept
             broken = error
-        record = EpisodeRecord(
-            task=task,
-            scenario=scenario,
-            strategy=self._strategy.name,
-            seed=seed,
-            initial_plan=plan,
+        record = replace(
+            record,
             boundaries=tuple(episode.boundaries),
             executed=monitor.executed,
             end=end,
@@ -143,10 +151,6 @@ class Runtime:
             simulated_s=episode.time_s,
             compute_s=monitor.seconds,
             final=monitor.final,
-            provenance=tuple(
-                (name, plain(value))
-                for name, value in (*provenance, ("perception", self._perceiver.describe()))
-            ),
         )
         if score is not None and broken is None:
             record = score(record)

@@ -30,7 +30,7 @@ from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.scene import SceneNeeds
-from forestall.types.task import Goal, Task
+from forestall.types.task import Goal
 from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
 from forestall.types.world import Working
 
@@ -368,8 +368,8 @@ class Strategy(Protocol):
 class Listener(Protocol):
     """Records, pages, progress; cannot change an episode."""
 
-    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
-        """The episode begins."""
+    def on_start(self, record: EpisodeRecord) -> None:
+        """The episode begins: what is known before it, without a boundary and without an end."""
 
     def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged: its record, and what was known."""

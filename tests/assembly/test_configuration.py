@@ -13,9 +13,9 @@ from forestall.assembly.configuration import Given, read_file, run_config
 from forestall.assembly.make import make_strategy, prepare, provenance
 from forestall.assembly.parts import Assembly
 from forestall.cli.flags import RunFlags, spelt
+from forestall.domain.load import shipped
 from forestall.errors import FileFormatError, InputError
 from forestall.kinds import DETECTOR, PERCEIVER, REASONER, REPLANNER, STORE, TEXT_ENCODER, WORLD
-from forestall.vocabulary import household
 
 FILE = """
 seed = 7
@@ -74,8 +74,7 @@ def test_short_names_mean_the_part_or_its_option() -> None:
 @pytest.mark.parametrize(
     ("named", "says"),
     [
-        ({"detector": {"thresold": 0.3}}, "option of the detector 'scene-graph' 'thresold'.*"
-         "did you mean threshold"),
+        ({"detector": {"thresold": 0.3}}, "'scene-graph' 'thresold': did you mean threshold"),
         ({"detector.threshold": "high"}, "threshold of the detector 'scene-graph' cannot be"),
         ({"threshold": 2}, "threshold 2.0 is not between 0 and 1"),
         ({"detector.empty": "two"}, "empty of the detector.*known: one, skip"),
@@ -97,7 +96,7 @@ def test_what_is_not_valid_is_said_with_what_would_be(named: dict[str, Any], say
     [
         (
             "[detectors]\nthreshold = 1",
-            "run.toml: unknown table 'detectors': did you mean detector",
+            "run.toml: unknown table 'detectors': did you mean det",
         ),
         ("seed = 'one'", "run.toml: seed cannot be 'one'"),
         ("[detector", "cannot read configuration .*run.toml"),
@@ -124,7 +123,7 @@ def test_ablations_are_choices_of_parts() -> None:
     reasoning = run_config("heat-potato", without="reasoning")
     assert reasoning.choice(REASONER).name == "none"
     assert reasoning.choice(REPLANNER).name == "anew"
-    parts = Assembly(run_config("heat-potato", without="structure").choices, household())
+    parts = Assembly(run_config("heat-potato", without="structure").choices, shipped("household"))
     assert parts.part(DETECTOR).name == "scene-graph without structure"
     unchecked = run_config("heat-potato", without="validation").choice(REPLANNER)
     assert dict(unchecked.given) == {"validator": "accept-all"}
@@ -132,8 +131,8 @@ def test_ablations_are_choices_of_parts() -> None:
 
 def test_a_strategy_that_compares_wants_a_memory() -> None:
     with pytest.raises(InputError, match="'proactive' compares with demonstrations"):
-        make_strategy(run_config("heat-potato"), household(), [])
-    assert make_strategy(run_config("heat-potato", strategy="none"), household(), None)
+        make_strategy(run_config("heat-potato"), shipped("household"), [])
+    assert make_strategy(run_config("heat-potato", strategy="none"), shipped("household"), None)
 
 
 def test_what_was_said_of_one_part_is_said_once() -> None:

@@ -15,10 +15,10 @@ from forestall.assembly.configuration import Given, choices, run_config
 from forestall.assembly.options import declared
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import TABLES, default, find, known
+from forestall.domain.load import shipped
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, SEGMENTER
 from forestall.types.kind import Kind
-from forestall.vocabulary import household
 
 OWN = '''
 class Calm:
@@ -74,7 +74,7 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def made(**named: object) -> object:
-    return Assembly(run_config("heat-potato", **named).choices, household()).part(DETECTOR)
+    return Assembly(run_config("heat-potato", **named).choices, shipped("household")).part(DETECTOR)
 
 
 def test_every_kind_has_a_table_and_every_shipped_part_declares_its_options() -> None:
@@ -103,7 +103,7 @@ def test_parts_of_others_are_found_built_and_watch_along(plugin: None) -> None:
     assert {"calm", "borrowing", "scene-graph"} <= set(known("detector"))
     assert vars(made(detector="calm", threshold=0.25))["threshold"] == 0.25
     borrowing = vars(made(detector={"name": "borrowing", "patience": "7"}))
-    assert (borrowing["patience"], borrowing["words"]) == (7, len(household().categories))
+    assert (borrowing["patience"], borrowing["words"]) == (7, len(shipped("household").categories))
     where_it_stands = made(detector="their_detectors:Calm")
     assert type(where_it_stands).__name__ == "Calm"
 
@@ -123,7 +123,7 @@ def test_what_does_not_work_is_named_with_its_package(plugin: None, name: str, w
 
 
 def test_options_of_others_are_checked_like_ours(plugin: None) -> None:
-    with pytest.raises(UnknownNameError, match="patence.*did you mean patience"):
+    with pytest.raises(UnknownNameError, match=r"patence.*did you mean patience"):
         made(detector={"name": "borrowing", "patence": 7})
     with pytest.raises(InputError, match=r"patience of the detector 'borrowing'.*'many'"):
         made(detector={"name": "borrowing", "patience": "many"})

@@ -10,14 +10,15 @@ from forestall.assembly.configuration import run_config
 from forestall.assembly.make import make_strategy, prepare
 from forestall.assembly.parts import Assembly
 from forestall.cli.main import call
+from forestall.domain.load import shipped
 from forestall.embeddings.twotower import TwoTowerEncoder
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import IMAGE_ENCODER, STATES
 from forestall.training import shards
+from forestall.training.questions import ATTRIBUTES
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.plan import Subtask
-from forestall.vocabulary import ATTRIBUTES, household
 
 
 @pytest.fixture
@@ -84,7 +85,7 @@ def test_unknown_names_are_refused_before_anything_is_built(
 def test_states_are_learned_when_nothing_is_said() -> None:
     config = run_config("heat-potato")
     assert config.choice(STATES).name == "learned"
-    one, two = (Assembly(config.choices, household()) for _ in range(2))
+    one, two = (Assembly(config.choices, shipped("household")) for _ in range(2))
     assert one.part(STATES).name == f"learned states ({TwoTowerEncoder().name})"
     assert one.part(IMAGE_ENCODER) is two.part(IMAGE_ENCODER)  # read once for each process
 
@@ -95,4 +96,6 @@ def test_a_memory_without_looks_is_refused_for_the_feature_image() -> None:
     step = DemonstrationStep(0, subtask, graph, graph)
     config = run_config("heat-potato", feature="image")
     with pytest.raises(InputError, match=r"node features of demonstration .* come from nothing"):
-        make_strategy(config, household(), [Demonstration("heat-potato", "kitchen-1", 1, (step,))])
+        make_strategy(
+            config, shipped("household"), [Demonstration("heat-potato", "kitchen-1", 1, (step,))]
+        )

@@ -15,16 +15,19 @@ from graph_pairs import (
 )
 
 from forestall.comparison.score import ScoreConfig, compare
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Change, Discrepancy
+
+DOMAIN = shipped("household")
 
 
 def differences(
     observed: SceneGraph, expected: SceneGraph, config: ScoreConfig | None = None
 ) -> tuple[Discrepancy, ...]:
     config = config or ScoreConfig()
-    return compare(observed, expected, config, HashedTextEncoder()).discrepancies
+    return compare(observed, expected, config, HashedTextEncoder(), DOMAIN).discrepancies
 
 
 def test_no_differences() -> None:

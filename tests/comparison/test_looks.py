@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from forestall.comparison.looks import NEVER, NOTHING, QUANTUM, joined, looks_of, seen
 from forestall.comparison.score import BatchScorer, Feature, ScoreConfig, compare
 from forestall.comparison.timing import random_graph, score_times
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError
 from forestall.types.feature import quantised
@@ -21,6 +22,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.verdict import ScoreParts
 
 ENCODER = HashedTextEncoder()
+DOMAIN = shipped("household")
 IMAGE = ScoreConfig(feature=Feature.IMAGE)
 EAST, NORTH, BETWEEN, NEARLY = (
     quantised(v) for v in ([1.0, 0.0], [0.0, 1.0], [127 * 0.5, 110.0], [4.0, 3.0])
@@ -39,11 +41,11 @@ def score(
     observed: SceneGraph, expected: SceneGraph, config: ScoreConfig = IMAGE
 ) -> tuple[ScoreParts, tuple[tuple[str, str], ...]]:
     """Parts and matches, the parts the same in a batch and the other way round."""
-    plain = compare(observed, expected, config, ENCODER)
-    batch = BatchScorer(config, ENCODER)
+    plain = compare(observed, expected, config, ENCODER, DOMAIN)
+    batch = BatchScorer(config, ENCODER, DOMAIN)
     assert batch.scores(observed, [expected, observed, expected]) == [
         plain.parts,
-        compare(observed, observed, config, ENCODER).parts,
+        compare(observed, observed, config, ENCODER, DOMAIN).parts,
         plain.parts,
     ]
     assert batch.scores(expected, [observed]) == [plain.parts]
@@ -140,7 +142,7 @@ def test_supports_are_one_node_whatever_they_look_like() -> None:
 def test_other_features_do_not_look(feature: Feature) -> None:
     config = ScoreConfig(feature=feature)
     rng = np.random.default_rng(2)
-    one, other = (random_graph(12, rng, feature_size=8) for _ in range(2))
+    one, other = (random_graph(12, rng, DOMAIN, feature_size=8) for _ in range(2))
     bare = [
         replace(g, nodes=tuple(replace(n, feature=None) for n in g.nodes)) for g in (one, other)
     ]
@@ -150,10 +152,10 @@ def test_other_features_do_not_look(feature: Feature) -> None:
 def test_features_of_two_encoders_do_not_compare() -> None:
     other = looking(scene("Mug-1"), Mug_1=quantised([1.0, 2.0, 3.0]))
     with pytest.raises(InputError, match="of 2 and 3 numbers do not compare"):
-        compare(other, MUG, IMAGE, ENCODER)
+        compare(other, MUG, IMAGE, ENCODER, DOMAIN)
     with pytest.raises(InputError, match="record the demonstrations with"):
-        BatchScorer(IMAGE, ENCODER).scores(scene("Mug-1"), [other, MUG])
-    assert compare(other, MUG, ScoreConfig(), ENCODER).parts.score == 1.0
+        BatchScorer(IMAGE, ENCODER, DOMAIN).scores(scene("Mug-1"), [other, MUG])
+    assert compare(other, MUG, ScoreConfig(), ENCODER, DOMAIN).parts.score == 1.0
 
 
 def test_a_floor_out_of_range() -> None:
@@ -192,8 +194,9 @@ def test_where_one_has_no_picture_or_may_not_match() -> None:
 
 
 def test_timing_with_images() -> None:
-    assert len(score_times(3, 8, seed=1, repeat=2, feature=Feature.IMAGE, feature_size=16)) == 2
-    plain = random_graph(20, np.random.default_rng(5))
+    times = score_times(3, 8, 1, DOMAIN, repeat=2, feature=Feature.IMAGE, feature_size=16)
+    assert len(times) == 2
+    plain = random_graph(20, np.random.default_rng(5), DOMAIN)
     assert all(n.feature is None for n in plain.nodes)
-    pictured = random_graph(20, np.random.default_rng(5), feature_size=16)
+    pictured = random_graph(20, np.random.default_rng(5), DOMAIN, feature_size=16)
     assert {len(n.feature) for n in pictured.nodes if n.feature is not None} == {16}

@@ -7,14 +7,14 @@ from graph_pairs import scene
 
 from forestall.comparison.lifting import evaluate
 from forestall.comparison.preconditions import MiningConfig, lift, mine, violations
+from forestall.domain.load import shipped
 from forestall.errors import InputError
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Reference
-from forestall.vocabulary import household
 
-VOCABULARY = household()
+DOMAIN = shipped("household")
 
 
 def references(task: str, index: int, *graphs: SceneGraph) -> list[Reference]:
@@ -38,8 +38,8 @@ def put_plate(
 
 def broken(refs: list[Reference], graph: SceneGraph, task: str | None = None) -> dict[str, Truth]:
     assert graph.subtask is not None
-    mined = mine(refs, VOCABULARY, subtask=graph.subtask, task=task)
-    return {str(v.literal): v.truth for v in violations(mined, graph, graph.subtask)}
+    mined = mine(refs, DOMAIN, subtask=graph.subtask, task=task)
+    return {str(v.literal): v.truth for v in violations(mined, graph, graph.subtask, DOMAIN)}
 
 
 HEAT = references("heat-potato", 8, *[put_plate() for _ in range(4)])
@@ -48,7 +48,7 @@ HEAT = references("heat-potato", 8, *[put_plate() for _ in range(4)])
 def test_lifted_literals() -> None:
     graph = put_plate()
     assert graph.subtask is not None
-    assert {str(x) for x in lift(graph, graph.subtask, VOCABULARY)} == {
+    assert {str(x) for x in lift(graph, graph.subtask, DOMAIN)} == {
         "accessible(?object)",
         "dirty(?object)=clean",
         "held_by(?object, gripper)",
@@ -66,7 +66,7 @@ def test_counters_and_fridges_are_never_vacant() -> None:
     for name in ("CounterTop-1", "Fridge-1", "Sink-1"):
         graph = scene(f"gripper; Mug-1; {name}", "", f"put_on(Mug-1, {name})")
         assert graph.subtask is not None
-        assert "vacant(?target)" not in {str(x) for x in lift(graph, graph.subtask, VOCABULARY)}
+        assert "vacant(?target)" not in {str(x) for x in lift(graph, graph.subtask, DOMAIN)}
 
 
 def test_what_else_the_hand_holds_goes_by_category() -> None:
@@ -74,7 +74,7 @@ def test_what_else_the_hand_holds_goes_by_category() -> None:
         "gripper; Lettuce-2; Bowl-1", "Lettuce-2 held_by gripper", "navigate_to_obj(Bowl-1)"
     )
     assert graph.subtask is not None
-    lifted = {str(x) for x in lift(graph, graph.subtask, VOCABULARY)}
+    lifted = {str(x) for x in lift(graph, graph.subtask, DOMAIN)}
     assert "held_by(Lettuce, gripper)" in lifted
     assert "hand_empty()" not in lifted
 
@@ -82,7 +82,7 @@ def test_what_else_the_hand_holds_goes_by_category() -> None:
 def test_driving_does_not_care_whether_the_target_is_open() -> None:
     graph = scene("gripper; Microwave-1 open=open", "", "navigate_to_obj(Microwave-1)")
     assert graph.subtask is not None
-    lifted = {x.predicate for x in lift(graph, graph.subtask, VOCABULARY)}
+    lifted = {x.predicate for x in lift(graph, graph.subtask, DOMAIN)}
     assert "open" not in lifted
     assert "vacant" in lifted
 
@@ -90,9 +90,9 @@ def test_driving_does_not_care_whether_the_target_is_open() -> None:
 def test_an_argument_that_is_only_a_category_is_unobserved() -> None:
     graph = scene("gripper; Mug-1; Mug-2", "", "pick_up(Mug)")
     assert graph.subtask is not None
-    assert {str(x) for x in lift(graph, graph.subtask, VOCABULARY)} == {"hand_empty()"}
+    assert {str(x) for x in lift(graph, graph.subtask, DOMAIN)} == {"hand_empty()"}
     literal = Literal("unblocked", ("?object",))
-    assert evaluate(literal, graph, graph.subtask) is Truth.UNOBSERVED
+    assert evaluate(literal, graph, graph.subtask, DOMAIN) is Truth.UNOBSERVED
 
 
 def test_nothing_is_violated_where_nothing_changed() -> None:
@@ -168,25 +168,25 @@ def test_literals_carry_over_to_other_instances_and_the_sister_skill() -> None:
 
 def test_a_literal_that_was_false_once_is_no_precondition() -> None:
     refs = references("heat-potato", 8, *[put_plate()] * 3, put_plate("open=closed"))
-    assert "open" not in {p.literal.predicate for p in mine(refs, VOCABULARY)}
+    assert "open" not in {p.literal.predicate for p in mine(refs, DOMAIN)}
 
 
 def test_unobserved_counts_neither_for_nor_against() -> None:
     refs = references("heat-potato", 8, put_plate(), put_plate(), put_plate("open=?"))
-    found = {str(p.literal): p for p in mine(refs, VOCABULARY)}
+    found = {str(p.literal): p for p in mine(refs, DOMAIN)}
     assert (found["open(?target)=open"].support, found["open(?target)=open"].total) == (2, 3)
     assert found["open(?target)=open"].weight == pytest.approx(2 / 3)
 
 
 def test_one_demonstration_is_not_enough() -> None:
-    assert mine(HEAT[:1], VOCABULARY) == ()
-    assert mine([], VOCABULARY) == ()
+    assert mine(HEAT[:1], DOMAIN) == ()
+    assert mine([], DOMAIN) == ()
 
 
 def test_two_steps_of_one_run_are_one_demonstration() -> None:
     twice = [HEAT[0], replace(HEAT[0], index=3)]
-    assert mine(twice, VOCABULARY) == ()
-    found = mine([*twice, HEAT[1]], VOCABULARY)
+    assert mine(twice, DOMAIN) == ()
+    found = mine([*twice, HEAT[1]], DOMAIN)
     assert {(p.support, p.total) for p in found} == {(2, 2)}
 
 
@@ -212,17 +212,18 @@ def test_the_hand_is_judged_by_the_same_step_of_the_same_task() -> None:
 
 def test_other_skills_are_passed_over() -> None:
     graph = put_plate("open=closed")
-    assert violations(mine(HEAT, VOCABULARY), graph, Subtask.parse("close_obj(Microwave-1)")) == ()
+    closing = Subtask.parse("close_obj(Microwave-1)")
+    assert violations(mine(HEAT, DOMAIN), graph, closing, DOMAIN) == ()
 
 
 def test_support_is_asked_for() -> None:
-    assert mine(HEAT[:3], VOCABULARY, MiningConfig(minimum_support=4)) == ()
+    assert mine(HEAT[:3], DOMAIN, MiningConfig(minimum_support=4)) == ()
     with pytest.raises(InputError):
         MiningConfig(minimum_support=0)
     one = MiningConfig(minimum_support=1, contextual_support=1)
-    assert "vacant(?target)" in {str(p.literal) for p in mine(HEAT[:1], VOCABULARY, one)}
+    assert "vacant(?target)" in {str(p.literal) for p in mine(HEAT[:1], DOMAIN, one)}
 
 
 def test_mining_does_not_depend_on_the_order_of_equals() -> None:
     shuffled = [replace(r, demonstration=f"x{i}") for i, r in enumerate(reversed(HEAT))]
-    assert mine(HEAT, VOCABULARY) == mine(shuffled, VOCABULARY)
+    assert mine(HEAT, DOMAIN) == mine(shuffled, DOMAIN)

@@ -16,17 +16,19 @@ from forestall.comparison.score import (
     compare,
 )
 from forestall.comparison.timing import DirectionEncoder, random_graph, score_times
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Reference
 
 ENCODER = HashedTextEncoder()
+DOMAIN = shipped("household")
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=lambda p: p.name)
 def test_worked_pairs(pair: Pair) -> None:
-    parts = compare(pair.observed, pair.expected, pair.config, ENCODER).parts
+    parts = compare(pair.observed, pair.expected, pair.config, ENCODER, DOMAIN).parts
     for value, wanted in (
         (parts.node, pair.node),
         (parts.edge, pair.edge),
@@ -40,14 +42,20 @@ def test_worked_pairs(pair: Pair) -> None:
 
 @pytest.mark.parametrize("pair", PAIRS, ids=lambda p: p.name)
 def test_worked_pairs_in_a_batch(pair: Pair) -> None:
-    scorer = BatchScorer(pair.config, ENCODER)
+    scorer = BatchScorer(pair.config, ENCODER, DOMAIN)
     both = scorer.scores(pair.observed, [pair.expected, pair.observed, pair.expected])
-    assert both[0] == both[2] == compare(pair.observed, pair.expected, pair.config, ENCODER).parts
+    assert (
+        both[0]
+        == both[2]
+        == compare(pair.observed, pair.expected, pair.config, ENCODER, DOMAIN).parts
+    )
 
 
 def graphs(largest: int = 14) -> st.SearchStrategy[SceneGraph]:
     return st.builds(
-        lambda n, seed, size: random_graph(n, np.random.default_rng(seed), feature_size=size),
+        lambda n, seed, size: random_graph(
+            n, np.random.default_rng(seed), DOMAIN, feature_size=size
+        ),
         st.integers(2, largest),
         st.integers(0, 2**20),
         st.sampled_from((0, 6, 6)),
@@ -74,13 +82,13 @@ configs = st.builds(
 @given(graphs(), configs)
 @settings(max_examples=60, deadline=None)
 def test_a_graph_fits_itself_perfectly(graph: SceneGraph, config: ScoreConfig) -> None:
-    assert compare(graph, graph, config, ENCODER).parts.score == 1.0
+    assert compare(graph, graph, config, ENCODER, DOMAIN).parts.score == 1.0
 
 
 @given(graphs(), graphs(), configs)
 @settings(max_examples=120, deadline=None)
 def test_symmetric_and_between_0_and_1(a: SceneGraph, b: SceneGraph, config: ScoreConfig) -> None:
-    there, back = compare(a, b, config, ENCODER), compare(b, a, config, ENCODER)
+    there, back = compare(a, b, config, ENCODER, DOMAIN), compare(b, a, config, ENCODER, DOMAIN)
     assert there.parts == back.parts
     assert sorted(there.matches) == sorted((o, e) for e, o in back.matches)
     for value in (there.parts.score, there.parts.node, there.parts.edge, there.parts.structure):
@@ -92,8 +100,8 @@ def test_symmetric_and_between_0_and_1(a: SceneGraph, b: SceneGraph, config: Sco
 def test_fast_equals_plain_exactly(
     observed: SceneGraph, expected: list[SceneGraph], config: ScoreConfig
 ) -> None:
-    fast = BatchScorer(config, ENCODER).scores(observed, [*expected, observed])
-    plain = [compare(observed, e, config, ENCODER).parts for e in [*expected, observed]]
+    fast = BatchScorer(config, ENCODER, DOMAIN).scores(observed, [*expected, observed])
+    plain = [compare(observed, e, config, ENCODER, DOMAIN).parts for e in [*expected, observed]]
     assert fast == plain
 
 
@@ -115,7 +123,7 @@ def test_losing_a_matched_node_never_raises_nodes_and_edges(
     observed, last = expected, 1.0
     for name in data.draw(st.permutations([n.id for n in expected.nodes])):
         observed = without(observed, name)
-        score = compare(observed, expected, config, ENCODER).parts.score
+        score = compare(observed, expected, config, ENCODER, DOMAIN).parts.score
         assert score <= last + 1e-12
         last = score
 
@@ -124,17 +132,19 @@ def test_structure_of_the_paper_is_not_monotone() -> None:
     """The only pair that differs in degree goes, and S_struc is perfect again (Eq. 3)."""
     expected = scene("Mug-1; Sink-1; Book-1", "Mug-1 inside Sink-1")
     two, one = scene("Sink-1; Book-1"), scene("Book-1")
-    assert compare(two, expected, ScoreConfig(), ENCODER).parts.structure == 0.5
-    assert compare(one, expected, ScoreConfig(), ENCODER).parts.structure == 1.0
+    assert compare(two, expected, ScoreConfig(), ENCODER, DOMAIN).parts.structure == 0.5
+    assert compare(one, expected, ScoreConfig(), ENCODER, DOMAIN).parts.structure == 1.0
     union = ScoreConfig(structure_count=StructureCount.UNION)
-    parts = [compare(g, expected, union, ENCODER).parts.structure for g in (expected, two, one)]
+    parts = [
+        compare(g, expected, union, ENCODER, DOMAIN).parts.structure for g in (expected, two, one)
+    ]
     assert parts == pytest.approx([1, 1 / 3, 1 / 3])
 
 
 def test_equal_things_are_told_apart_by_their_surroundings() -> None:
     observed = scene("Mug-1; Mug-2; Sink-1", "Mug-2 inside Sink-1")
     expected = scene("Mug-1; Mug-2; Sink-1", "Mug-1 inside Sink-1")
-    result = compare(observed, expected, ScoreConfig(), ENCODER)
+    result = compare(observed, expected, ScoreConfig(), ENCODER, DOMAIN)
     assert result.parts.score == 1.0
     assert ("Mug-2", "Mug-1") in result.matches
 
@@ -142,20 +152,22 @@ def test_equal_things_are_told_apart_by_their_surroundings() -> None:
 def test_the_argument_matches_the_argument() -> None:
     observed = scene("Mug-1; Mug-2", "", "pick_up(Mug-2)")
     expected = scene("Mug-1; Mug-2", "", "pick_up(Mug-1)")
-    matches = compare(observed, expected, ScoreConfig(), ENCODER).matches
+    matches = compare(observed, expected, ScoreConfig(), ENCODER, DOMAIN).matches
     assert set(matches) == {("Mug-2", "Mug-1"), ("Mug-1", "Mug-2")}
 
 
 def test_matches_name_the_members_of_merged_supports() -> None:
     observed = scene("CounterTop-1; DiningTable-1")
-    matches = compare(observed, scene("Shelf-3"), ScoreConfig(), ENCODER).matches
+    matches = compare(observed, scene("Shelf-3"), ScoreConfig(), ENCODER, DOMAIN).matches
     assert matches == (("CounterTop-1", "Shelf-3"),)
 
 
 def test_other_skills_are_other_subtask_nodes() -> None:
     a, b = scene("Mug-1", "", "pick_up(Mug-1)"), scene("Mug-1", "", "open_obj(Fridge-1)")
-    assert compare(a, b, ScoreConfig(), ENCODER).parts.node == pytest.approx(1 / 3)
-    assert compare(a, scene("Mug-1"), ScoreConfig(), ENCODER).parts.node == pytest.approx(1 / 2)
+    assert compare(a, b, ScoreConfig(), ENCODER, DOMAIN).parts.node == pytest.approx(1 / 3)
+    assert compare(a, scene("Mug-1"), ScoreConfig(), ENCODER, DOMAIN).parts.node == pytest.approx(
+        1 / 2
+    )
 
 
 def test_best_takes_the_first_of_equal_references() -> None:
@@ -163,7 +175,7 @@ def test_best_takes_the_first_of_equal_references() -> None:
         assert graph.subtask is not None
         return Reference(name, "heat-potato", 8, graph.subtask, 1.0, graph)
 
-    scorer = BatchScorer(ScoreConfig(), ENCODER)
+    scorer = BatchScorer(ScoreConfig(), ENCODER, DOMAIN)
     references = [reference("a", DIRTY), reference("b", EXPECTED), reference("c", EXPECTED)]
     best = scorer.best(OCCUPIED, references)
     assert best is not None
@@ -177,10 +189,10 @@ def test_best_takes_the_first_of_equal_references() -> None:
 
 def test_a_small_cache_changes_nothing() -> None:
     rng = np.random.default_rng(4)
-    many = [random_graph(8, rng) for _ in range(40)]
+    many = [random_graph(8, rng, DOMAIN) for _ in range(40)]
     small, large = (
-        BatchScorer(ScoreConfig(), ENCODER, cache_size=3),
-        BatchScorer(ScoreConfig(), ENCODER),
+        BatchScorer(ScoreConfig(), ENCODER, DOMAIN, cache_size=3),
+        BatchScorer(ScoreConfig(), ENCODER, DOMAIN),
     )
     for g in many[:5]:
         assert small.scores(g, many) == large.scores(g, many)
@@ -202,17 +214,19 @@ def test_bad_options(bad: dict[str, float]) -> None:
 
 def test_unknown_predicate() -> None:
     with pytest.raises(UnknownNameError, match="inside"):
-        ScoreConfig(predicates=("insid",))
+        ScoreConfig(predicates=("insid",)).of(DOMAIN)
+    with pytest.raises(UnknownNameError, match="inside"):
+        BatchScorer(ScoreConfig(predicates=("insid",)), ENCODER, DOMAIN)
 
 
 def test_timing_helper() -> None:
-    assert len(score_times(3, 8, seed=1, repeat=4)) == 4
-    assert len(score_times(1, 4, 1, 1, DirectionEncoder())) == 1
+    assert len(score_times(3, 8, 1, DOMAIN, repeat=4)) == 4
+    assert len(score_times(1, 4, 1, DOMAIN, 1, DirectionEncoder())) == 1
     with pytest.raises(InputError):
-        score_times(0, 8, 1)
+        score_times(0, 8, 1, DOMAIN)
 
 
 def test_random_graphs_come_from_their_seed() -> None:
-    one, two = (random_graph(30, np.random.default_rng(7)) for _ in range(2))
+    one, two = (random_graph(30, np.random.default_rng(7), DOMAIN) for _ in range(2))
     assert one == two
     assert len(one.nodes) == 30

@@ -6,6 +6,7 @@ from baseline_samples import Said, graph, node, observation, reference
 
 from forestall.detection.caption import CaptionDetector
 from forestall.detection.scene_graph import DetectorConfig
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.embeddings.captions import ListingCaptioner
 from forestall.embeddings.twotower import TwoTowerEncoder
@@ -15,7 +16,6 @@ from forestall.seams import Detector
 from forestall.types.demonstration import View
 from forestall.types.graph import Relation
 from forestall.types.verdict import Decision
-from forestall.vocabulary import household
 
 TEXTS = HashedTextEncoder()
 
@@ -47,7 +47,7 @@ def test_another_caption_is_flagged_below_the_threshold() -> None:
 
 
 def test_relations_do_not_show_in_a_listing() -> None:
-    captioner = ListingCaptioner(household())
+    captioner = ListingCaptioner(shipped("household"))
     apart = graph(node("Mug-1", filled="empty"), "Pot-1")
     links = (Relation("Pot-1", "blocking", "Mug-1"),)
     blocked = graph(node("Mug-1", filled="empty"), "Pot-1", links=links)

@@ -5,15 +5,18 @@ from baseline_samples import graph, node, observation, reference
 
 from forestall.detection.objects import ObjectCountDetector, counts
 from forestall.detection.scene_graph import DetectorConfig
+from forestall.domain.load import shipped
 from forestall.seams import Detector
 from forestall.types.graph import ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.verdict import Decision
 
+DOMAIN = shipped("household")
+SUPPORTS = DOMAIN.tagged(DOMAIN.roles.support)
 EXPECTED = graph("Mug-1", "Sink-1", "Sink-2")
 
 
 def judged(observed: SceneGraph, *expected: SceneGraph, threshold: float = 0.9) -> float | None:
-    detector: Detector = ObjectCountDetector(DetectorConfig(threshold))
+    detector: Detector = ObjectCountDetector(DOMAIN, DetectorConfig(threshold))
     references = [reference(str(i), expected=g) for i, g in enumerate(expected)]
     verdict = detector.judge(observed, observation(), references)
     fits = verdict.score is None or verdict.score >= threshold
@@ -58,7 +61,7 @@ def test_counted_is_what_has_a_box() -> None:
         node("Egg-1", Seen.UNOBSERVED),
         ObjectNode("Pan-1", "Pan"),
     )
-    assert counts(mixed) == {"Mug": 2}
+    assert counts(mixed, SUPPORTS) == {"Mug": 2}
 
 
 def test_nothing_anywhere_is_not_judged() -> None:

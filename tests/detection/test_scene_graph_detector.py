@@ -5,6 +5,7 @@ import pytest
 
 from forestall.comparison.score import BatchScorer, ScoreConfig
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
@@ -12,6 +13,7 @@ from forestall.types.observation import Frame, GripperState, Intrinsics, Observa
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Calibration, Decision, Reference
 
+DOMAIN = shipped("household")
 BOX = Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 
 
@@ -41,7 +43,7 @@ def reference(expected: SceneGraph, name: str = "d") -> Reference:
 
 def detector(threshold: float = 0.9) -> SceneGraphDetector:
     return SceneGraphDetector(
-        BatchScorer(ScoreConfig(), HashedTextEncoder()), DetectorConfig(threshold)
+        BatchScorer(ScoreConfig(), HashedTextEncoder(), DOMAIN), DetectorConfig(threshold)
     )
 
 
@@ -119,7 +121,7 @@ def test_threshold_is_checked() -> None:
 
 
 def test_several_can_watch_under_their_own_names(observation: Observation) -> None:
-    scorer = BatchScorer(ScoreConfig(use_edge=False), HashedTextEncoder())
+    scorer = BatchScorer(ScoreConfig(use_edge=False), HashedTextEncoder(), DOMAIN)
     other = SceneGraphDetector(scorer, name="scene-graph without edges")
     seen = graph("Mug-1", "Pot-1", links=(Relation("Pot-1", "blocking", "Mug-1"),))
     expected = reference(graph("Mug-1", "Pot-1"))

@@ -13,16 +13,16 @@ from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Calibration, Decision, Replan, ReplanOutcome, Verdict
-from planning.corpus import PLANS, VOCABULARY, home_of, scene
+from planning.corpus import PLANS, DOMAIN, home_of, scene
 from planning.episodes import context, seen
 
 ALARM = Verdict(Decision.REPLAN, "image", 0.5, 0.9, Calibration.FIXED)
-REASONER = NoReasoning(VOCABULARY)
+REASONER = NoReasoning(DOMAIN)
 
 
 def boundary(task: str, before: str, where: str) -> BoundaryContext:
     index = PLANS[task].texts().index(before)
-    graph = seen(observed(scene(home_of(task), where), VOCABULARY))
+    graph = seen(observed(scene(home_of(task), where), DOMAIN))
     return context(task, PLANS[task], index, graph)
 
 
@@ -45,7 +45,7 @@ CASES = {
 
 def replan(boundary: BoundaryContext) -> Replan:
     reasoner: Reasoner = REASONER
-    replanner = GoalReplanner(GraphValidator(VOCABULARY), VOCABULARY)
+    replanner = GoalReplanner(GraphValidator(DOMAIN), DOMAIN)
     return replanner.replan(boundary, reasoner.diagnose(boundary, ALARM))
 
 
@@ -56,7 +56,7 @@ def test_a_plan_for_the_goal_from_what_is_seen(name: str) -> None:
     assert (found.outcome, found.producer) == (ReplanOutcome.SOLVED, "goal planner")
     assert found.plan is not None and found.check is not None
     assert found.check.ok
-    assert GraphValidator(VOCABULARY).check(found.plan, case.graph, case.task.goal).ok
+    assert GraphValidator(DOMAIN).check(found.plan, case.graph, case.task.goal).ok
 
 
 def test_the_cause_is_not_named() -> None:
@@ -109,5 +109,5 @@ def without(graph: SceneGraph, name: str) -> SceneGraph:
 def test_without_validation_every_plan_is_accepted() -> None:
     case = boundary(*CASES["dropped mug"])
     wrong = Plan.parse(["pick_up(Mug)", "pick_up(Mug)", "put_in(Mug, Sink)"])
-    assert not GraphValidator(VOCABULARY).check(wrong, case.graph, case.task.goal).ok
+    assert not GraphValidator(DOMAIN).check(wrong, case.graph, case.task.goal).ok
     assert AcceptAll().check(wrong, case.graph, case.task.goal).ok

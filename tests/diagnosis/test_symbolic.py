@@ -7,7 +7,7 @@ import pytest
 
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner
-from forestall.planning.domain import Refusal, apply
+from forestall.planning.execute import Refusal, apply
 from forestall.planning.validate import GraphValidator, observed, unmet
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.facts import Literal, Truth
@@ -23,7 +23,7 @@ from forestall.types.verdict import (
     Verdict,
     Violation,
 )
-from planning.corpus import GOALS, PLANS, VOCABULARY, home_of, scene
+from planning.corpus import DOMAIN, GOALS, PLANS, VOCABULARY, home_of, scene
 from planning.episodes import context, demonstrations, ground, seen
 
 ALARM = Verdict(Decision.REPLAN, "test", 0.5, 0.9, Calibration.FIXED)
@@ -35,7 +35,7 @@ def diagnose(task: str, before: str, where: str, plan: Plan | None = None) -> Di
     steps = plan or PLANS[task]
     index = steps.texts().index(before)
     known = demonstrations(task)[PLANS[task].texts().index(before)]
-    state = observed(scene(home_of(task), where), VOCABULARY)
+    state = observed(scene(home_of(task), where), DOMAIN)
     graph = seen(state)
     return REASONER.diagnose(context(task, steps, index, graph, known), ALARM)
 
@@ -131,7 +131,7 @@ def test_what_held_in_the_demonstrations_and_holds_now_must_stay() -> None:
 @pytest.mark.parametrize("task", sorted(PLANS))
 def test_undisturbed_runs_have_nothing_to_change(task: str) -> None:
     known = demonstrations(task)
-    state = observed(scene(home_of(task)), VOCABULARY)
+    state = observed(scene(home_of(task)), DOMAIN)
     for index, subtask in enumerate(PLANS[task].subtasks):
         graph = seen(state)
         found = REASONER.diagnose(context(task, PLANS[task], index, graph, known[index]), ALARM)
@@ -238,8 +238,8 @@ def test_diagnosis_and_repair_save_the_task(name: str) -> None:
     steps = Plan(tuple(s for s in PLANS[task].subtasks if str(s) != dropped))
     known = demonstrations(task)
     nominal = PLANS[task].texts()
-    replanner = PlannerReplanner(GraphValidator(VOCABULARY), VOCABULARY)
-    states = [observed(scene(home_of(task), where), VOCABULARY)]
+    replanner = PlannerReplanner(GraphValidator(DOMAIN), DOMAIN)
+    states = [observed(scene(home_of(task), where), DOMAIN)]
     index = repairs = 0
     fault = name == "mug-dropped"
     while index < len(steps):
@@ -249,7 +249,7 @@ def test_diagnosis_and_repair_save_the_task(name: str) -> None:
             put = state.copy()
             put.held = None
             put.places["Mug-1"] = next(
-                iter(observed(scene("Mug-1 on Floor-1"), VOCABULARY).places.values())
+                iter(observed(scene("Mug-1 on Floor-1"), DOMAIN).places.values())
             )
             states[-1] = state = put
         text = str(steps.subtasks[index])
@@ -285,7 +285,7 @@ def diagnose_after(task: str, done: str, where: str) -> Diagnosis:
         replace(r, graph=next_step.graph)
         for r, next_step in zip(runs[index], runs[index + 1], strict=True)
     ]
-    graph = seen(observed(scene(home_of(task), where), VOCABULARY))
+    graph = seen(observed(scene(home_of(task), where), DOMAIN))
     moment = replace(context(task, plan, index, graph, after), when=When.AFTER)
     step = Subtask(moment.subtask.skill, after[0].subtask.args)
     return REASONER.diagnose(replace(moment, subtask=step), ALARM)

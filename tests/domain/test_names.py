@@ -2,11 +2,11 @@
 
 import pytest
 
-from forestall.grounding import executable, ground_subtask
+from forestall.domain.names import executable, ground_subtask
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
-from forestall.vocabulary import household
+from forestall.domain.load import shipped
 
 
 def at(name: str, category: str, x: float, **states: str) -> ObjectNode:
@@ -46,13 +46,13 @@ GRAPH = SceneGraph(
 )
 def test_grounding(text: str, bound: dict[str, str], grounded: str) -> None:
     here = (0.0, 0.0, 0.0)
-    assert str(ground_subtask(Subtask.parse(text), GRAPH, household(), here, bound)) == grounded
+    assert str(ground_subtask(Subtask.parse(text), GRAPH, shipped("household"), here, bound)) == grounded
 
 
 def test_open_supports_are_left_to_the_robot() -> None:
     planned = Subtask.parse("put_on(Bowl, CounterTop)")
     ground = Subtask.parse("put_on(Bowl-2, CounterTop-2)")
-    assert str(executable(ground, planned, household())) == "put_on(Bowl-2, CounterTop)"
+    assert str(executable(ground, planned, shipped("household"))) == "put_on(Bowl-2, CounterTop)"
     exact = Subtask.parse("put_on(Bowl, CounterTop-1)")
     ground = Subtask.parse("put_on(Bowl-2, CounterTop-1)")
-    assert str(executable(ground, exact, household())) == "put_on(Bowl-2, CounterTop-1)"
+    assert str(executable(ground, exact, shipped("household"))) == "put_on(Bowl-2, CounterTop-1)"

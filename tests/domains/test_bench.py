@@ -4,8 +4,8 @@ import pytest
 from bench_scenes import BENCH, bench
 
 from forestall.domain.evaluate import TRUE, evaluate, solutions
-from forestall.planning_new.execute import Refusal, apply, resolve
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask

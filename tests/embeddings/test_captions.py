@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from forestall.domain.load import shipped
 from forestall.embeddings.captions import ListingCaptioner
 from forestall.embeddings.views import sentences
 from forestall.seams import Captioner
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
-from forestall.vocabulary import household
 
 OBSERVATION = Observation(
     (
@@ -25,7 +25,7 @@ OBSERVATION = Observation(
 
 
 def caption(*nodes: ObjectNode, links: tuple[Relation, ...] = ()) -> str:
-    captioner: Captioner = ListingCaptioner(household())
+    captioner: Captioner = ListingCaptioner(shipped("household"))
     hand = ObjectNode(GRIPPER, GRIPPER)
     return captioner.caption(OBSERVATION, SceneGraph((hand, *nodes), links))
 
@@ -62,8 +62,10 @@ def test_what_is_out_of_view_is_not_said() -> None:
 def test_a_thing_without_a_visible_state_is_named() -> None:
     bare = ObjectNode("StoveBurner-3", "StoveBurner", (("toggled", None),))
     assert caption(bare) == "A stove burner."
-    unseen = [a.name for a in household().attributes.values() if not a.camera]
-    warm = ObjectNode("Mug-1", "Mug", tuple((a, household().values(a)[-1]) for a in unseen))
+    unseen = [a.name for a in shipped("household").attributes.values() if not a.camera]
+    warm = ObjectNode(
+        "Mug-1", "Mug", tuple((a, shipped("household").values(a)[-1]) for a in unseen)
+    )
     assert caption(warm) == "A mug."
     assert caption(ObjectNode("Umbrella-1", "Umbrella")) == "An Umbrella."
 

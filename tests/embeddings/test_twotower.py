@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forestall.domain.load import load_domain
 from forestall.embeddings.twotower import DESCRIPTION_NAME, TwoTowerEncoder, shipped
 from forestall.errors import InputError, ModelFileError
-from forestall.vocabulary import household
 
 
 @pytest.fixture(scope="module")
@@ -48,11 +48,9 @@ def test_texts_that_say_the_same_are_near(encoder: TwoTowerEncoder) -> None:
 
 
 def test_values_of_an_attribute_are_told_apart(encoder: TwoTowerEncoder) -> None:
-    vocabulary = household()
+    domain = load_domain("household")
     for category, attribute in (("Microwave", "open"), ("Mug", "filled"), ("Plate", "dirty")):
-        texts = [
-            vocabulary.phrases(category, attribute, v)[0] for v in vocabulary.values(attribute)
-        ]
+        texts = [domain.phrases(category, attribute, v)[0] for v in domain.values(attribute)]
         rows = encoder.encode(texts)
         cosines = rows @ rows.T - 2 * np.eye(len(rows))
         assert cosines.max() < 0.8, (texts, cosines)

@@ -28,6 +28,8 @@ def quiet(done: int, total: int, what: str) -> None:
 
 
 def play(experiment: Experiment, out: Path, compute: object = computed_row) -> list[EpisodeRow]:
+    if compute is computed_row:  # which kills no worker
+        experiment = replace(experiment, engine="inline")
     return conduct(experiment, out, quiet, compute, lambda *a: None)  # type: ignore[arg-type]
 
 
@@ -101,6 +103,7 @@ def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
     assert again == rows
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_path: Path) -> None:
     rows = play(replace(SMALL, workers=1), tmp_path, deadly_row)
     broken = [r for r in rows if r.end == "error"]

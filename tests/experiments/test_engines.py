@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,14 @@ def test_without_ray_the_message_says_what_to_install(monkeypatch: pytest.Monkey
         make_lanes("ray", 1)
 
 
+def test_inline_work_is_done_here() -> None:
+    found = dict(computed([[1, 2], [3]], make_lanes("inline", 2), doubled))
+    assert found == {job: (2 * job, os.getpid()) for job in (1, 2, 3)}
+    with pytest.raises(ValueError, match="job 7"):
+        list(computed([[7]], make_lanes("inline", 1), broken))
+
+
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_local_cluster_of_two_workers_gives_the_same_answers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

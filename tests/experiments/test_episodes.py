@@ -1,6 +1,7 @@
 """Episodes of one's own choice: seeds, runs, resuming, tables."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ TOAST = Experiment(
     Episodes(("toast-bread",), ("knife-blocked",), ("none",), (1, 2)),
     settings=Settings(pages="none"),
     kind=KIND,
+    engine="inline",
 )
 
 
@@ -80,24 +82,15 @@ def test_rows_of_other_code_settings_or_memory_do_not_pass_for_current(
 
 
 def test_a_changed_file_of_ones_own_is_another_experiment(tmp_path: Path) -> None:
-    from forestall.tasks.files import load_task
-
-    text = json.dumps  # task files are TOML; their content is what is digested
-    shipped = load_task("toast-bread").task
+    document = (Path(__file__).parents[2] / "docs" / "task-format.md").read_text(encoding="utf-8")
+    task, _, _ = re.findall(r"```toml\n(.*?)```", document, re.DOTALL)
     path = tmp_path / "own.toml"
-    lines = [
-        'name = "own"',
-        'title = "Own"',
-        f"goal = {text(shipped.goal.text)}",
-        "plan = " + text(shipped.plan.texts()),
-    ]
-    path.write_text("\n".join(lines))
-    try:
-        one = Episodes((str(path),), (), ("none",), (1,)).about()
-    except InputError:
-        pytest.skip("the task format asks for more")
-    path.write_text("\n".join(lines).replace('"Own"', '"Mine"'))
-    assert Episodes((str(path),), (), ("none",), (1,)).about() != one
+    path.write_text(task)
+    mine = replace(TOAST, choice=Episodes((str(path),), (), ("none",), (1,)))
+    assert len(play(mine, tmp_path / "out")) == 1
+    path.write_text(task.replace('title = "', 'title = "Quickly: '))
+    with pytest.raises(InputError, match="files"):
+        play(mine, tmp_path / "out")
 
 
 def test_a_file_is_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,8 @@ def _few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def made(out: Path, workers: int) -> None:
-    experiment = Experiment(Choice("all", "development", limit=4), workers)
+    engine = "inline" if workers == 1 else "local"
+    experiment = Experiment(Choice("all", "development", limit=4), workers, engine)
     conduct(experiment, out, lambda *a: None, computed_row, lambda *a: None)
 
 

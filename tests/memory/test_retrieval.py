@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from demonstration_samples import demonstration, with_id
 
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.errors import InputError, MemoryFileError
 from forestall.memory.retrieval import EmbeddingRetriever, RetrievalConfig, subtask_words
@@ -14,6 +15,7 @@ from forestall.types.demonstration import Demonstration, View
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
+DOMAIN = shipped("household")
 COFFEE = (
     "navigate_to_obj(Mug-1)",
     "pick_up(Mug-1)",
@@ -38,7 +40,8 @@ MEMORY = [
 
 
 def retriever(**options: float) -> EmbeddingRetriever:
-    return EmbeddingRetriever(MEMORY, HashedTextEncoder(), RetrievalConfig(**options))  # type: ignore[arg-type]
+    config = RetrievalConfig(**options)  # type: ignore[arg-type]
+    return EmbeddingRetriever(MEMORY, HashedTextEncoder(), DOMAIN, config)
 
 
 def order(subtask: str, task: str, done: int, **options: float) -> list[tuple[str, int]]:
@@ -100,35 +103,36 @@ def test_the_picture_and_what_came_after_are_handed_on() -> None:
     final = SceneGraph(())
     steps = (*coffee.steps[:3], viewed, coffee.steps[4])
     memory = [replace(coffee, steps=steps, final=final)]
-    found = EmbeddingRetriever(memory, HashedTextEncoder())
+    found = EmbeddingRetriever(memory, HashedTextEncoder(), DOMAIN)
     first, second = found.retrieve(Subtask.parse("pick_up(Mug-1)"), "make-coffee", 3)
     assert (first.index, second.index) == (3, 1)
     assert first.view is viewed.view and second.view is None
     assert first.after is coffee.steps[4].whole
     last = found.retrieve(Subtask.parse("put_in(Mug-1, CoffeeMachine-1)"), "make-coffee", 4)[0]
     assert last.after is final
-    unwatched = EmbeddingRetriever([coffee], HashedTextEncoder())
+    unwatched = EmbeddingRetriever([coffee], HashedTextEncoder(), DOMAIN)
     assert unwatched.retrieve(coffee.steps[4].subtask, "make-coffee", 4)[0].after is None
 
 
 def test_numbers_are_stripped() -> None:
-    assert subtask_words(Subtask.parse("put_on(Pot-2, StoveBurner-4)")) == "put Pot StoveBurner"
+    step = Subtask.parse("put_on(Pot-2, StoveBurner-4)")
+    assert subtask_words(step, DOMAIN) == "put Pot StoveBurner"
 
 
 def test_from_a_store(tmp_path: Path) -> None:
     with open_store(tmp_path / "demos.db", create=True) as store:
         with pytest.raises(MemoryFileError, match="holds no demonstrations"):
-            EmbeddingRetriever(store, HashedTextEncoder())
+            EmbeddingRetriever(store, HashedTextEncoder(), DOMAIN)
         for d in MEMORY:
             store.add(d)
-        found = EmbeddingRetriever(store, HashedTextEncoder()).retrieve(
+        found = EmbeddingRetriever(store, HashedTextEncoder(), DOMAIN).retrieve(
             Subtask.parse("pick_up(Mug-1)"), "make-coffee", 1
         )
     assert [(r.demonstration, r.index) for r in found[:2]] == [("c1", 1), ("c2", 1)]
 
 
 def test_the_order_of_the_memory_does_not_matter() -> None:
-    back = EmbeddingRetriever(MEMORY[::-1], HashedTextEncoder())
+    back = EmbeddingRetriever(MEMORY[::-1], HashedTextEncoder(), DOMAIN)
     subtask = Subtask.parse("pick_up(Mug-1)")
     assert back.retrieve(subtask, "make-coffee", 1) == retriever().retrieve(
         subtask, "make-coffee", 1

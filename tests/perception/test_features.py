@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import PerceptionError
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
@@ -18,7 +19,6 @@ from forestall.types.feature import quantised
 from forestall.types.graph import Seen
 from forestall.types.observation import Frame, Mask, Rgb
 from forestall.types.plan import Subtask
-from forestall.vocabulary import household
 
 from .synthetic import Solid, at, looking, observed
 
@@ -52,7 +52,7 @@ class ColourAndSize:
 
 def perceiver(encoder: ImageEncoder | None) -> GraphPerceiver:
     return GraphPerceiver(
-        InstanceSegmenter(), GivenStateEstimator({}), household(), image_encoder=encoder
+        InstanceSegmenter(), GivenStateEstimator({}), shipped("household"), image_encoder=encoder
     )
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from forestall.domain.load import shipped
 from forestall.errors import FileFormatError, PerceptionError, UnknownNameError
 from forestall.perception.folder import read_observation, write_observation
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
 from forestall.types.observation import Frame, Observation
-from forestall.vocabulary import household
 
 from .synthetic import Solid, at, looking, observed
 
@@ -54,8 +54,8 @@ def test_what_was_written_is_read_back(folder: Path) -> None:
 
 def test_the_graph_is_that_of_the_original(folder: Path) -> None:
     observation, states = read_observation(folder)
-    from_folder = GraphPerceiver(GivenMasks(), GivenStateEstimator(states), household())
-    direct = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator(STATES), household())
+    from_folder = GraphPerceiver(GivenMasks(), GivenStateEstimator(states), shipped("household"))
+    direct = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator(STATES), shipped("household"))
     original = observed(SCENE, POSE, holding="Mug-1", time_s=3.5)
     assert from_folder.perceive(observation) == direct.perceive(original)
 

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
+from forestall.domain.truth import truth as truth_of
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph, Seen
-from forestall.vocabulary import household
 
 from .synthetic import Solid, at, hollow, looking, observed
 
@@ -27,7 +28,9 @@ class Robot:
 
     def __init__(self) -> None:
         self.states: dict[str, dict[str, str]] = {}
-        self._perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), household())
+        self._perceiver = GraphPerceiver(
+            InstanceSegmenter(), GivenStateEstimator({}), shipped("household")
+        )
         self._time_s = 0.0
 
     def sees(
@@ -45,7 +48,7 @@ class Robot:
 
 
 def truth(graph: SceneGraph, text: str) -> Truth:
-    return graph.truth(Literal.parse(text))
+    return truth_of(graph, Literal.parse(text), shipped("household"))
 
 
 def seen(graph: SceneGraph, name: str) -> Seen:

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import InputError
 from forestall.perception.learned import LearnedStateEstimator
 from forestall.types.encoder import StateReading
 from forestall.types.observation import Detection, Frame, Intrinsics
-from forestall.vocabulary import household
 
 
 class ColourEncoder:
@@ -65,14 +65,14 @@ def look(colour: tuple[int, int, int], size: int = 40) -> tuple[Frame, np.ndarra
 def test_the_most_fitting_phrase_wins_unless_two_fit(
     colour: tuple[int, int, int], said: str | None
 ) -> None:
-    estimator = LearnedStateEstimator(ColourEncoder(READING), household())
+    estimator = LearnedStateEstimator(ColourEncoder(READING), shipped("household"))
     frame, mask = look(colour)
     assert estimator.estimate(frame, [Detection("Fridge", mask, "Fridge-1")]) == [{"open": said}]
 
 
 def test_a_small_or_empty_mask_is_unobserved_and_not_encoded() -> None:
     encoder = ColourEncoder(READING)
-    estimator = LearnedStateEstimator(encoder, household())
+    estimator = LearnedStateEstimator(encoder, shipped("household"))
     frame, mask = look((200, 0, 0), size=1)
     empty = np.zeros_like(mask)
     found = estimator.estimate(frame, [Detection("Fridge", mask), Detection("Drawer", empty)])
@@ -82,7 +82,7 @@ def test_a_small_or_empty_mask_is_unobserved_and_not_encoded() -> None:
 
 def test_what_has_no_attributes_or_no_category_says_nothing() -> None:
     encoder = ColourEncoder(READING)
-    estimator = LearnedStateEstimator(encoder, household())
+    estimator = LearnedStateEstimator(encoder, shipped("household"))
     frame, mask = look((200, 0, 0))
     found = estimator.estimate(frame, [Detection("Floor", mask), Detection("Unicorn", mask)])
     assert found == [{}, {}]
@@ -90,7 +90,7 @@ def test_what_has_no_attributes_or_no_category_says_nothing() -> None:
 
 
 def test_no_camera_sees_temperature() -> None:
-    estimator = LearnedStateEstimator(ColourEncoder(READING), household())
+    estimator = LearnedStateEstimator(ColourEncoder(READING), shipped("household"))
     assert "temperature" not in {q.attribute for q in estimator.questions("Mug")}
 
 
@@ -103,7 +103,7 @@ def test_nothing_else_is_said_of_what_is_broken() -> None:
             ]
             return np.array(rows, dtype=np.float32)
 
-    vocabulary = household()
+    vocabulary = shipped("household")
     values = [vocabulary.phrases("Plate", "broken", v) for v in ("intact", "broken")]
     assert not any("broken" in t.split() for t in values[0])
     estimator = LearnedStateEstimator(Shards(READING), vocabulary)
@@ -118,7 +118,7 @@ def test_a_phrase_that_cannot_be_read_is_named() -> None:
         def encode(self, texts: Sequence[str]) -> np.ndarray:
             raise InputError("cannot read 'x'")
 
-    estimator = LearnedStateEstimator(Strict(READING), household())
+    estimator = LearnedStateEstimator(Strict(READING), shipped("household"))
     frame, mask = look((200, 0, 0))
     with pytest.raises(InputError, match=r"open=closed of Fridge.*cannot read"):
         estimator.estimate(frame, [Detection("Fridge", mask)])

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 from forestall.errors import PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.geometry import Stack, Thing
@@ -23,7 +25,6 @@ from forestall.seams import Perceiver, Segmenter, StateEstimator
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
-from forestall.vocabulary import household
 
 from .synthetic import Solid, at, looking, observed
 
@@ -54,8 +55,8 @@ def as_detections(observation: Observation, named: bool, order: Sequence[int] = 
 def test_the_parts_fulfil_their_protocols() -> None:
     segmenter: Segmenter = InstanceSegmenter()
     other: Segmenter = GivenMasks()
-    oracle: StateEstimator = OracleStateEstimator(lambda name: {})
-    perceiver: Perceiver = GraphPerceiver(segmenter, oracle, household())
+    oracle: StateEstimator = OracleStateEstimator(lambda name: {}, shipped("household"))
+    perceiver: Perceiver = GraphPerceiver(segmenter, oracle, shipped("household"))
     assert perceiver.describe() == {
         "segmenter": "simulator instance ids",
         "state_estimator": "oracle states",
@@ -69,13 +70,13 @@ def test_the_order_of_detections_does_not_matter(order: list[int]) -> None:
     observation = observed(SCENE, EYE)
     graphs = []
     for chosen in (list(range(len(SCENE))), order):
-        perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), household())
+        perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), shipped("household"))
         graphs.append(perceiver.perceive(as_detections(observation, named=True, order=chosen)))
     assert graphs[0] == graphs[1]
 
 
 def test_untracked_detections_keep_their_names_over_time() -> None:
-    perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), household())
+    perceiver = GraphPerceiver(GivenMasks(), GivenStateEstimator({}), shipped("household"))
     first = perceiver.perceive(as_detections(observed(SCENE, EYE), named=False))
     assert {n.id for n in first.of_category("Mug")} == {"Mug-1", "Mug-2"}
     other = looking((0.3, -0.7, 1.65), (0.0, 0.3, 0.9))
@@ -176,7 +177,9 @@ def test_moving_the_world_moves_the_graph() -> None:
     pose[:3, 3] += shift
     graphs = []
     for solids, camera in ((SCENE, EYE), ([s.moved(shift) for s in SCENE], pose)):
-        perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), household())
+        perceiver = GraphPerceiver(
+            InstanceSegmenter(), GivenStateEstimator({}), shipped("household")
+        )
         graphs.append(perceiver.perceive(observed(solids, camera)))
     assert graphs[0].relations == graphs[1].relations
 
@@ -187,7 +190,7 @@ def test_nothing_has_two_parents_or_is_its_own(
     data: list[tuple[float, float, float, float]],
 ) -> None:
     stack = things(data, np.zeros(3))
-    found = parents(stack, {t.id for t in stack.things}, household(), PerceptionConfig())
+    found = parents(stack, {t.id for t in stack.things}, shipped("household"), PerceptionConfig())
     for name in found:
         passed = [name]
         while passed[-1] in found:
@@ -205,15 +208,17 @@ def test_the_oracle_tells_only_what_a_camera_could() -> None:
 
     frame = observed([COUNTER, at("Mug-1", 0.0, 0.3, 0.9, MUG, True)], EYE).frames[0]
     found = InstanceSegmenter().segment(frame)
-    near = OracleStateEstimator(states).estimate(frame, found)
+    near = OracleStateEstimator(states, shipped("household")).estimate(frame, found)
     by_name = dict(zip([d.instance for d in found], near, strict=True))
     assert by_name["Mug-1"] == {"filled": "coffee", "dirty": "dirty"}
     assert set(asked) == {"CounterTop-1", "Mug-1"}
-    far = OracleStateEstimator(states, fine_pixels=10**6).estimate(frame, found)
+    far = OracleStateEstimator(states, shipped("household"), fine_pixels=10**6).estimate(
+        frame, found
+    )
     by_name = dict(zip([d.instance for d in found], far, strict=True))
     assert by_name["Mug-1"] == {"filled": None, "dirty": None}
     unnamed = [Detection("Mug", found[0].mask)]
-    assert OracleStateEstimator(states).estimate(frame, unnamed) == [{}]
+    assert OracleStateEstimator(states, shipped("household")).estimate(frame, unnamed) == [{}]
 
 
 def test_an_estimator_that_answers_for_too_few_is_refused() -> None:
@@ -223,13 +228,13 @@ def test_an_estimator_that_answers_for_too_few_is_refused() -> None:
         def estimate(self, frame: Frame, detections: Sequence[Detection]) -> list[dict[str, str]]:
             return []
 
-    perceiver = GraphPerceiver(InstanceSegmenter(), Silent(), household())
+    perceiver = GraphPerceiver(InstanceSegmenter(), Silent(), shipped("household"))
     with pytest.raises(PerceptionError, match="silent"):
         perceiver.perceive(observed(SCENE, EYE))
 
 
 def test_times_are_measured_one_by_one() -> None:
-    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), household())
+    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), shipped("household"))
     times = perception_times(perceiver, observed(SCENE, EYE), 3)
     assert len(times) == 3
     assert min(times) > 0
@@ -256,9 +261,11 @@ def whole_graph() -> SceneGraph:
     return SceneGraph(tuple(nodes), tuple(Relation(*f) for f in facts), hidden=hidden)
 
 
-def scoped(text: str, config: ScopeConfig | None = None) -> SceneGraph:
+def scoped(
+    text: str, config: ScopeConfig | None = None, domain: Domain = shipped("household")
+) -> SceneGraph:
     perceiver = GraphPerceiver(
-        InstanceSegmenter(), GivenStateEstimator({}), household(), scope_config=config
+        InstanceSegmenter(), GivenStateEstimator({}), domain, scope_config=config
     )
     return perceiver.scope(whole_graph(), Subtask.parse(text))
 
@@ -303,6 +310,8 @@ def test_the_whole_graph_can_be_asked_for() -> None:
     assert str(graph.subtask) == "pick_up(Knife-1)"
 
 
-def test_chosen_predicates_are_kept() -> None:
-    graph = scoped("pick_up(Knife-1)", ScopeConfig(predicates=("near",)))
+def test_the_relations_that_the_domain_scores_are_kept() -> None:
+    usual = shipped("household")
+    predicates = {n: replace(p, scored=n == "near") for n, p in usual.predicates.items()}
+    graph = scoped("pick_up(Knife-1)", domain=replace(usual, predicates=predicates))
     assert {str(r) for r in graph.relations} == {"Pot-1 near Knife-1"}

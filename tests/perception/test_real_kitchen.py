@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
@@ -13,8 +14,9 @@ from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Intrinsics, Observation
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.environment import KitchenEnvironment
+
+pytestmark = pytest.mark.simulator
 
 NEEDS = SceneNeeds(
     objects=(
@@ -62,20 +64,20 @@ def blocked(graph: SceneGraph) -> set[str]:
 @pytest.fixture(scope="module", params=[301, 302])
 def run(request: pytest.FixtureRequest) -> Iterator[tuple[SceneGraph, SceneGraph, int, int]]:
     """Graph and truth after the last look, and how many visible facts were right and wrong."""
-    vocabulary = household()
+    domain = shipped("household")
     kitchen = KitchenEnvironment(
-        NEEDS, vocabulary, intrinsics=Intrinsics.from_vertical_fov(480, 360, 60.0)
+        NEEDS, domain, intrinsics=Intrinsics.from_vertical_fov(480, 360, 60.0)
     )
     kitchen.reset(request.param)
     perceiver = GraphPerceiver(
-        InstanceSegmenter(), OracleStateEstimator(kitchen.oracle.states), vocabulary
+        InstanceSegmenter(), OracleStateEstimator(kitchen.oracle.states, domain), domain
     )
     right = wrong = 0
     for observation in looks(kitchen):
         graph, truth = perceiver.perceive(observation), kitchen.oracle.truth()
         for node in graph.nodes:
-            category = vocabulary.find(node.category)
-            if category is None or category.fixture or node.seen is not Seen.VISIBLE:
+            category = domain.find(node.category)
+            if category is None or "fixture" in category.tags or node.seen is not Seen.VISIBLE:
                 continue
             stated, true = facts(graph, SUPPORT, node.id), facts(truth, SUPPORT, node.id)
             right += len(stated & true)
@@ -102,12 +104,12 @@ def test_what_stands_in_front_blocks(run: Run) -> None:
 
 def test_only_what_is_closed_is_hidden(run: Run) -> None:
     graph, truth, _, _ = run
-    vocabulary = household()
+    domain = shipped("household")
     shut = [
         n.id
         for n in truth.nodes
-        if n.category in vocabulary.categories
-        and vocabulary.encloses(n.category)
+        if n.category in domain.categories
+        and domain.encloses(n.category)
         and n.state("open") == "closed"
         and graph.get(n.id) is not None
     ]

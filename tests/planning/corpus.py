@@ -7,13 +7,14 @@ separated by commas: `Mug-1 on CounterTop-1`, `Egg-1 in Fridge-1`, `Pot-1 blocks
 
 from __future__ import annotations
 
+from forestall.domain.load import shipped
 from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
-from forestall.vocabulary import ATTRIBUTES, household
+from forestall.domain.load import shipped
 
-VOCABULARY = household()
+DOMAIN = shipped("household")
 _PREDICATES = {"on": "on_top_of", "in": "inside", "blocks": "blocking"}
 _BOX = Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 
@@ -28,7 +29,7 @@ def scene(*texts: str) -> SceneGraph:
     held = None
 
     def known(name: str) -> None:
-        states.setdefault(name, dict(VOCABULARY.default_states(name)))
+        states.setdefault(name, dict(DOMAIN.default_states(name)))
 
     for line in ",".join(texts).replace("\n", ",").split(","):
         words = line.split()

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from forestall.planning.domain import Refusal, State, apply, resolve
+from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.state import State
 from forestall.planning.validate import observed
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
@@ -16,7 +17,7 @@ from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Task
 from forestall.types.verdict import Reference
-from planning.corpus import GOALS, PLANS, VOCABULARY, home_of, scene
+from planning.corpus import GOALS, PLANS, DOMAIN, home_of, scene
 
 _BOX = Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 OBSERVATION = Observation(
@@ -35,23 +36,17 @@ OBSERVATION = Observation(
 
 def seen(state: State) -> SceneGraph:
     """The graph of a state as a robot would see it: what is in closed containers is hidden."""
-    visible = sorted(n for n in state.kinds if state.closed_around(n) is None)
-    hidden = [
-        n for n in visible if state.vocabulary.encloses(n) and state.value(n, "open") == "closed"
-    ]
+    visible = sorted(n for n in state.kinds if state.says("accessible", n))
+    hidden = [n for n in visible if state.says("shut", n)]
     nodes = [ObjectNode(GRIPPER, GRIPPER)]
     for name in visible:
         values = tuple((a, v) for (n, a), v in state.values.items() if n == name)
         box = None if name in state.lost else _BOX
         nodes.append(ObjectNode(name, state.kinds[name], values, box and box.centre, box))
-    relations = [
-        Relation(n, state.places[n].relation, state.places[n].parent)
-        for n in visible
-        if n in state.places
-    ]
+    relations = [Relation(n, p.relation, p.parent) for n in visible if (p := state.place(n))]
     if state.held is not None:
         relations.append(Relation(state.held, "held_by", GRIPPER))
-    relations += [Relation(y, "blocking", x) for y, x in state.blocking]
+    relations += [Relation(f[1], f[0], f[2]) for f in state.facts if f[0] == "blocking"]
     return SceneGraph(tuple(nodes), tuple(relations), hidden=tuple(hidden))
 
 
@@ -66,7 +61,7 @@ def demonstrations(task: str, count: int = 4) -> list[list[Reference]]:
     steps: list[list[Reference]] = [[] for _ in PLANS[task].subtasks]
     for k in range(count):
         spot = f"Apple-1 on CounterTop-{k % 2 + 1}"
-        state = observed(scene(home_of(task), spot if task != "switch-devices" else ""), VOCABULARY)
+        state = observed(scene(home_of(task), spot if task != "switch-devices" else ""), DOMAIN)
         for index, subtask in enumerate(PLANS[task].subtasks):
             step = ground(state, subtask)
             steps[index].append(Reference(f"demo-{k}", task, index, step, 1.0, seen(state)))
@@ -89,7 +84,7 @@ def context(
     references: Sequence[Reference] = (),
 ) -> BoundaryContext:
     """The context of one boundary."""
-    state = observed(graph, VOCABULARY)
+    state = observed(graph, DOMAIN)
     return BoundaryContext(
         task=task_of(task),
         plan=plan,

@@ -8,13 +8,13 @@ import pytest
 from forestall.planning.pddl import GOAL, Pddl, export
 from forestall.planning.planner import pose, with_driving
 from forestall.planning.problem import Problem
-from forestall.planning.relevance import alternatives
+from forestall.planning.goals import alternatives
 from forestall.planning.search import SearchOutcome, solve
 from forestall.planning.state import State
 from forestall.planning.validate import GraphValidator, observed
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
-from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, VOCABULARY, home_of, scene
+from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, DOMAIN, home_of, scene
 from planning.test_search import DISTURBED, UNSOLVABLE
 
 POSED: dict[str, tuple[str, Goal]] = {
@@ -27,7 +27,7 @@ POSED: dict[str, tuple[str, Goal]] = {
 
 def posed(name: str) -> tuple[State, Problem] | None:
     where, wanted = POSED[name]
-    state = observed(scene(where), VOCABULARY)
+    state = observed(scene(where), DOMAIN)
     goals = alternatives(state, wanted)
     return (state, pose(state, goals)) if goals else None
 
@@ -105,5 +105,5 @@ def test_fast_downward_agrees(name: str, tmp_path: Path, monkeypatch: pytest.Mon
         return
     subtasks, final, why = with_driving(state, text.read_plan(theirs))
     assert final is not None, why
-    check = GraphValidator(VOCABULARY).check(Plan(subtasks), scene(POSED[name][0]), POSED[name][1])
+    check = GraphValidator(DOMAIN).check(Plan(subtasks), scene(POSED[name][0]), POSED[name][1])
     assert check.ok, check.reason

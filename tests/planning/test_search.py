@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from forestall.planning.domain import Refusal, apply
+from forestall.planning.execute import Refusal, apply
 from forestall.planning.planner import plan_goal, plan_to, pose
 from forestall.planning.problem import Atom, Problem
-from forestall.planning.relevance import alternatives
+from forestall.planning.goals import alternatives
 from forestall.planning.search import SearchConfig, SearchOutcome, solve
 from forestall.planning.state import State
 from forestall.planning.validate import GraphValidator, observed
@@ -15,7 +15,7 @@ from forestall.types.facts import Literal
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
 from forestall.types.verdict import ReplanOutcome
-from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, VOCABULARY, goal, home_of, scene
+from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, DOMAIN, goal, home_of, scene
 
 DISTURBED = {
     "heat-potato": "Bowl-1 in Microwave-1, Plate-1 is dirty, Apple-1 on Plate-1",
@@ -73,7 +73,7 @@ def _comparable(atom: Atom, state: State) -> bool:
 @pytest.mark.parametrize("disturbed", [False, True])
 def test_operators_and_skills_agree_on_random_walks(task: str, disturbed: bool) -> None:
     graph = scene(home_of(task), DISTURBED[task] if disturbed else "")
-    first = observed(graph, VOCABULARY)
+    first = observed(graph, DOMAIN)
     problem = pose(first, alternatives(first, GOALS[task]))
     rng = random.Random(7)
     steps = 0
@@ -101,18 +101,18 @@ def test_operators_and_skills_agree_on_random_walks(task: str, disturbed: bool) 
 @pytest.mark.parametrize("disturbed", [False, True])
 def test_planning_from_scratch_reaches_the_goal(task: str, disturbed: bool) -> None:
     graph = scene(home_of(task), DISTURBED[task] if disturbed else "")
-    planned = plan_goal(observed(graph, VOCABULARY), GOALS[task])
+    planned = plan_goal(observed(graph, DOMAIN), GOALS[task])
     assert planned.outcome is ReplanOutcome.SOLVED, planned.note
-    check = GraphValidator(VOCABULARY).check(Plan(planned.subtasks), graph, GOALS[task])
+    check = GraphValidator(DOMAIN).check(Plan(planned.subtasks), graph, GOALS[task])
     assert check.ok, check.reason
 
 
 def test_a_large_goal_is_planned_and_checks_out() -> None:
     graph = scene(LARGE_SCENE)
-    planned = plan_goal(observed(graph, VOCABULARY), LARGE)
+    planned = plan_goal(observed(graph, DOMAIN), LARGE)
     assert planned.outcome is ReplanOutcome.SOLVED
     assert len([s for s in planned.subtasks if s.skill != "navigate_to_obj"]) > 40
-    assert GraphValidator(VOCABULARY).check(Plan(planned.subtasks), graph, LARGE).ok
+    assert GraphValidator(DOMAIN).check(Plan(planned.subtasks), graph, LARGE).ok
 
 
 UNSOLVABLE: dict[str, tuple[str, Goal]] = {
@@ -138,18 +138,18 @@ UNSOLVABLE: dict[str, tuple[str, Goal]] = {
 @pytest.mark.parametrize("name", sorted(UNSOLVABLE))
 def test_dead_ends_are_proven_with_a_reason(name: str) -> None:
     where, wanted = UNSOLVABLE[name]
-    planned = plan_goal(observed(scene(KITCHEN, where), VOCABULARY), wanted)
+    planned = plan_goal(observed(scene(KITCHEN, where), DOMAIN), wanted)
     assert planned.outcome is ReplanOutcome.UNSOLVABLE
     assert planned.note
 
 
 def test_a_lost_thing_is_named() -> None:
-    planned = plan_goal(observed(scene(KITCHEN, "Mug-1 lost"), VOCABULARY), GOALS["make-coffee"])
+    planned = plan_goal(observed(scene(KITCHEN, "Mug-1 lost"), DOMAIN), GOALS["make-coffee"])
     assert "Mug: its place is not known" in planned.note
 
 
 def test_running_out_of_time_is_told_apart() -> None:
-    state = observed(scene(KITCHEN), VOCABULARY)
+    state = observed(scene(KITCHEN), DOMAIN)
     planned = plan_goal(state, GOALS["make-salad"], SearchConfig(max_expansions=2))
     assert planned.outcome is ReplanOutcome.TIMEOUT
     planned = plan_goal(state, GOALS["make-salad"], SearchConfig(time_limit_s=0.0))
@@ -157,20 +157,20 @@ def test_running_out_of_time_is_told_apart() -> None:
 
 
 def test_geometry_is_unsupported() -> None:
-    state = observed(scene(KITCHEN), VOCABULARY)
+    state = observed(scene(KITCHEN), DOMAIN)
     planned = plan_goal(state, goal("near(Mug-1, Cup-1)"))
     assert planned.outcome is ReplanOutcome.UNSUPPORTED
 
 
 def test_a_goal_that_holds_needs_no_step() -> None:
-    state = observed(scene(KITCHEN), VOCABULARY)
+    state = observed(scene(KITCHEN), DOMAIN)
     planned = plan_goal(state, goal("on_top_of(Mug, CounterTop)", "hand_empty()"))
     assert (planned.outcome, planned.subtasks) == (ReplanOutcome.SOLVED, ())
 
 
 def test_negative_vacant_and_unblocked_goals() -> None:
     graph = scene(KITCHEN, "Pot-1 on CounterTop-1, Pot-1 blocks Knife-1, Cup-1 in Fridge-1")
-    state = observed(graph, VOCABULARY)
+    state = observed(graph, DOMAIN)
     wanted = goal("not inside(Cup-1, Fridge-1)", "unblocked(Knife-1)", "held_by(Cup-1, gripper)")
     planned = plan_goal(state, wanted)
     assert planned.outcome is ReplanOutcome.SOLVED
@@ -179,7 +179,7 @@ def test_negative_vacant_and_unblocked_goals() -> None:
 
 
 def test_planning_is_deterministic() -> None:
-    state = observed(scene(KITCHEN, DISTURBED["make-salad"]), VOCABULARY)
+    state = observed(scene(KITCHEN, DISTURBED["make-salad"]), DOMAIN)
     assert (
         plan_goal(state, GOALS["make-salad"]).subtasks
         == plan_goal(state, GOALS["make-salad"]).subtasks
@@ -187,7 +187,7 @@ def test_planning_is_deterministic() -> None:
 
 
 def test_search_proves_unsolvability_by_exhaustion() -> None:
-    state = observed(scene(KITCHEN), VOCABULARY)
+    state = observed(scene(KITCHEN), DOMAIN)
     wanted = goal("inside(Mug-1, CoffeeMachine-1)", "inside(Cup-1, CoffeeMachine-1)")
     problem = pose(state, alternatives(state, wanted))
     result = solve(problem)
@@ -196,7 +196,7 @@ def test_search_proves_unsolvability_by_exhaustion() -> None:
 
 
 def test_parking_names_the_kind_of_support_and_never_the_floor() -> None:
-    state = observed(scene(KITCHEN, "Bowl-1 in Microwave-1, Microwave-1 is open"), VOCABULARY)
+    state = observed(scene(KITCHEN, "Bowl-1 in Microwave-1, Microwave-1 is open"), DOMAIN)
     planned = plan_to(state, [(Literal("vacant", ("Microwave-1",)), Literal("hand_empty", ()))])
     assert [str(s) for s in planned.subtasks] == [
         "navigate_to_obj(Microwave-1)",

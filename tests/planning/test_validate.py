@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import pytest
 
-from forestall.planning.domain import Refusal, apply
+from forestall.planning.execute import Refusal, apply
 from forestall.planning.validate import GraphValidator, observed, run
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
-from planning.corpus import GOALS, PLANS, VOCABULARY, goal, home_of, plan, scene
+from planning.corpus import GOALS, PLANS, DOMAIN, goal, home_of, plan, scene
 from planning.wrong_plans import WRONG, Wrong
 
-CHECK = GraphValidator(VOCABULARY).check
+CHECK = GraphValidator(DOMAIN).check
 
 
 @pytest.mark.parametrize("task", sorted(PLANS))
@@ -78,7 +78,7 @@ def test_running_water_cleans_and_fills_what_is_empty_and_leaves_wine() -> None:
     graph = scene(
         "Sink-1, Faucet-1, Mug-1 in Sink-1, Mug-1 is dirty, Bowl-1 in Sink-1, Bowl-1 is wine"
     )
-    trace = run(observed(graph, VOCABULARY), [Subtask("toggle_on", ("Faucet",))])
+    trace = run(observed(graph, DOMAIN), [Subtask("toggle_on", ("Faucet",))])
     assert trace.final.value("Mug-1", "dirty") == "clean"
     assert trace.final.value("Mug-1", "filled") == "water"
     assert trace.final.value("Bowl-1", "filled") == "wine"
@@ -86,7 +86,7 @@ def test_running_water_cleans_and_fills_what_is_empty_and_leaves_wine() -> None:
 
 def test_microwave_heats_bread_without_toasting_it() -> None:
     graph = scene("Microwave-1, BreadSliced-1 in Microwave-1")
-    after = apply(observed(graph, VOCABULARY), Subtask("toggle_on", ("Microwave",)))
+    after = apply(observed(graph, DOMAIN), Subtask("toggle_on", ("Microwave",)))
     assert not isinstance(after, Refusal)
     assert after.value("BreadSliced-1", "temperature") == "hot"
     assert after.value("BreadSliced-1", "cooked") == "raw"
@@ -95,11 +95,11 @@ def test_microwave_heats_bread_without_toasting_it() -> None:
 def test_ready_food_is_spoiled_by_dirt_and_raw_whole_food_is_not() -> None:
     graph = scene("CounterTop-1, Plate-1 on CounterTop-1, Plate-1 is dirty, BreadSliced-1 held")
     put = Subtask("put_on", ("BreadSliced", "Plate"))
-    after = apply(observed(graph, VOCABULARY), put)
+    after = apply(observed(graph, DOMAIN), put)
     assert not isinstance(after, Refusal)
     assert after.spoiled == {"BreadSliced-1"}
     graph = scene("CounterTop-1, Plate-1 on CounterTop-1, Plate-1 is dirty, Potato-1 held")
-    after = apply(observed(graph, VOCABULARY), Subtask("put_on", ("Potato", "Plate")))
+    after = apply(observed(graph, DOMAIN), Subtask("put_on", ("Potato", "Plate")))
     assert not isinstance(after, Refusal)
     assert after.spoiled == set()
 
@@ -107,12 +107,12 @@ def test_ready_food_is_spoiled_by_dirt_and_raw_whole_food_is_not() -> None:
 def test_contents_travel_with_their_container() -> None:
     graph = scene(home_of("heat-potato"), "Potato-1 on Plate-1")
     steps = plan("pick_up(Plate)\nput_on(Plate, DiningTable)").subtasks
-    final = run(observed(graph, VOCABULARY), steps).final
+    final = run(observed(graph, DOMAIN), steps).final
     assert final.root("Potato-1") == "DiningTable-1"
 
 
 def test_apply_leaves_the_given_state_alone() -> None:
-    state = observed(scene(home_of("toast-bread"), "Knife-1 held"), VOCABULARY)
+    state = observed(scene(home_of("toast-bread"), "Knife-1 held"), DOMAIN)
     before = state.copy()
     after = apply(state, Subtask("slice_obj", ("Bread",)))
     assert not isinstance(after, Refusal)
@@ -127,13 +127,13 @@ def test_category_names_mean_the_held_then_the_free_then_the_lowest() -> None:
         "Mug-1 in Fridge-1, Mug-2 on CounterTop-1, Cup-1 blocks Mug-2, Mug-10 on CounterTop-1",
         "Mug-3 on CounterTop-2",
     )
-    final = run(observed(graph, VOCABULARY), [Subtask("pick_up", ("Mug",))]).final
+    final = run(observed(graph, DOMAIN), [Subtask("pick_up", ("Mug",))]).final
     assert final.held == "Mug-3"
 
 
 def test_receptacle_category_means_one_with_room() -> None:
     graph = scene(home_of("boil-water"), "Pan-1 on StoveBurner-1, Pot-1 held")
-    final = run(observed(graph, VOCABULARY), [Subtask("put_on", ("Pot", "StoveBurner"))]).final
+    final = run(observed(graph, DOMAIN), [Subtask("put_on", ("Pot", "StoveBurner"))]).final
     assert final.places["Pot-1"].parent == "StoveBurner-2"
 
 

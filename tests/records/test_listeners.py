@@ -64,7 +64,7 @@ def test_names_are_not_read_as_markup_and_failures_are_said() -> None:
     odd = records.Subtask("pick_up", ("[red]Mug[/red]",))
     file = io.StringIO()
     line = ProgressLine(Console(file=file, width=100), clock=Clock())
-    line.on_start(record.task, record.initial_plan, 0)
+    line.on_start(records.begun(record))
     done = SkillOutcome(SkillStatus.SUCCEEDED, 1.0)
     line.on_executed(ExecutedRecord(odd, done, 0), 1.0)
     assert "[red]Mug[/red]" in file.getvalue()
@@ -74,7 +74,7 @@ def test_stopping_is_said_with_its_reason() -> None:
     file = io.StringIO()
     line = ProgressLine(Console(file=file, width=100), clock=Clock())
     record = records.potato_record()
-    line.on_start(record.task, record.initial_plan, 0)
+    line.on_start(records.begun(record))
     (boundary, context), *_ = records.calls(record)
     line.on_boundary(replace(boundary, outcome=Outcome.HOLD, why="no plan works"), context)
     assert "stopped before navigate_to_obj(Potato): no plan works" in file.getvalue()
@@ -85,7 +85,7 @@ def test_a_run_that_raises_gives_the_terminal_back() -> None:
     record = records.potato_record()
     console = Console(file=file, force_terminal=True, width=100)
     with pytest.raises(RuntimeError), ProgressLine(console, clock=Clock()) as line:
-        line.on_start(record.task, record.initial_plan, 0)
+        line.on_start(records.begun(record))
         raise RuntimeError
     assert file.getvalue().count("\x1b[?25l") == file.getvalue().count("\x1b[?25h") == 1
 

@@ -91,13 +91,7 @@ def test_no_file_and_no_text(tmp_path: Path) -> None:
 
 def test_a_killed_run_reads_back_as_far_as_it_came(tmp_path: Path) -> None:
     record = records.potato_record()
-    recorder = RunRecorder(
-        tmp_path,
-        scenario="microwave-occupied",
-        strategy="proactive",
-        provenance=dict(record.provenance),
-    )
-    records.follow(recorder, record, 9)
+    records.follow(RunRecorder(tmp_path), record, 9)
     found = read_record(tmp_path)
     assert (found.end, found.success, found.final) == (EpisodeEnd.UNFINISHED, None, None)
     assert unseen(found) == replace(
@@ -186,7 +180,7 @@ def test_lines_and_record_say_the_same_of_a_boundary(tmp_path: Path, make: objec
 def test_a_second_run_in_the_same_folder_replaces_the_first(tmp_path: Path) -> None:
     record = records.potato_record()
     recorder = RunRecorder(tmp_path)
-    recorder.on_start(record.task, record.initial_plan, 1)
+    recorder.on_start(records.begun(record))
     recorder.on_end(record)
     records.follow(recorder, record, 2)
     found = read_record(tmp_path)

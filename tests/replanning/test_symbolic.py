@@ -10,10 +10,10 @@ from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Plan
 from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome
-from planning.corpus import GOALS, PLANS, VOCABULARY, home_of, plan, scene
+from planning.corpus import GOALS, PLANS, DOMAIN, home_of, plan, scene
 from planning.episodes import context
 
-VALIDATOR = GraphValidator(VOCABULARY)
+VALIDATOR = GraphValidator(DOMAIN)
 
 
 @dataclass(frozen=True)
@@ -246,13 +246,13 @@ def attempt(case: Repair, config: SearchConfig | None = None) -> tuple[Replan, P
         tuple(map(Literal.parse, case.must_change)),
         tuple(map(Literal.parse, case.must_stay)),
     )
-    replanner = PlannerReplanner(VALIDATOR, VOCABULARY, config)
+    replanner = PlannerReplanner(VALIDATOR, DOMAIN, config)
     answer = replanner.replan(context(case.task, current, index, graph), diagnosis)
     if answer.outcome is ReplanOutcome.SOLVED:
         assert answer.plan is not None
         check = VALIDATOR.check(answer.plan, graph, GOALS[case.task])
         assert check.ok, check.reason
-        trace = run(observed(graph, VOCABULARY), answer.plan.subtasks)
+        trace = run(observed(graph, DOMAIN), answer.plan.subtasks)
         for fact in diagnosis.must_change:
             assert any(s.holds(fact) for s in trace.states), fact
         assert not any("Floor" in s.args[1:] for s in answer.plan)
@@ -298,7 +298,7 @@ def test_a_lost_mug_is_unsolvable_and_named() -> None:
 
 def test_nothing_to_change() -> None:
     graph = scene(home_of("make-coffee"))
-    replanner = PlannerReplanner(VALIDATOR, VOCABULARY)
+    replanner = PlannerReplanner(VALIDATOR, DOMAIN)
     answer = replanner.replan(
         context("make-coffee", PLANS["make-coffee"], 0, graph), Diagnosis("all is well", ())
     )
@@ -336,7 +336,7 @@ def test_an_impossible_demand_does_not_hide_a_possible_one() -> None:
     )
     graph = scene(home_of(case.task), case.scene)
     index = PLANS["heat-potato"].texts().index(case.before)
-    answer = PlannerReplanner(VALIDATOR, VOCABULARY).replan(
+    answer = PlannerReplanner(VALIDATOR, DOMAIN).replan(
         context("heat-potato", PLANS["heat-potato"], index, graph),
         Diagnosis("a cause", tuple(map(Literal.parse, case.must_change))),
     )
@@ -349,7 +349,7 @@ def test_where_the_rest_does_not_reach_the_goal_a_new_plan_does() -> None:
     short = Plan(PLANS["make-coffee"].subtasks[:-3])
     graph = scene(home_of("make-coffee"), "Mug-1 held, Cup-1 in CoffeeMachine-1")
     index = short.texts().index("put_in(Mug, CoffeeMachine)")
-    answer = PlannerReplanner(VALIDATOR, VOCABULARY).replan(
+    answer = PlannerReplanner(VALIDATOR, DOMAIN).replan(
         context("make-coffee", short, index, graph),
         Diagnosis("a cup is in the way", (Literal.parse("vacant(CoffeeMachine-1)"),)),
     )
@@ -363,7 +363,7 @@ def test_the_thing_at_hand_is_named_where_there_are_several() -> None:
         home_of("make-coffee"), "Mug-2 held, Mug-1 on CounterTop-1, Cup-1 in CoffeeMachine-1"
     )
     index = PLANS["make-coffee"].texts().index("put_in(Mug, CoffeeMachine)")
-    answer = PlannerReplanner(VALIDATOR, VOCABULARY).replan(
+    answer = PlannerReplanner(VALIDATOR, DOMAIN).replan(
         context("make-coffee", PLANS["make-coffee"], index, graph),
         Diagnosis("a cup is in the way", (Literal.parse("vacant(CoffeeMachine-1)"),)),
     )

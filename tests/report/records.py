@@ -386,9 +386,24 @@ def calls(record: EpisodeRecord) -> list[tuple[BoundaryRecord, BoundaryContext]]
     return found
 
 
+def begun(record: EpisodeRecord) -> EpisodeRecord:
+    """What is known of a run before it begins."""
+    return EpisodeRecord(
+        task=record.task,
+        scenario=record.scenario,
+        strategy=record.strategy,
+        seed=record.seed,
+        initial_plan=record.initial_plan,
+        boundaries=(),
+        executed=(),
+        end=EpisodeEnd.UNFINISHED,
+        provenance=record.provenance,
+    )
+
+
 def follow(listener: Listener, record: EpisodeRecord, boundaries: int | None = None) -> None:
     """Tell a listener of a run, of its first boundaries only where a number is given."""
-    listener.on_start(record.task, record.initial_plan, record.seed)
+    listener.on_start(begun(record))
     executed = {e.index: e for e in record.executed}
     for boundary, context in calls(record)[:boundaries]:
         listener.on_boundary(boundary, context)

@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from forestall.domain.load import shipped
+from forestall.report.drawn import drawn
 from forestall.report.graph_layout import text_width
 from forestall.report.graph_svg import graph_svg
-from forestall.types.facts import GRIPPER, RELATIONS
+from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Change, Discrepancy
@@ -21,11 +23,13 @@ NS = "{http://www.w3.org/2000/svg}"
 SUBTASK = Subtask.parse("put_in(Plate-1, Microwave-1)")
 SideName = Literal["observed", "expected"]
 
+DRAWN = drawn("household")
+
 
 def draw(side: SideName, said: tuple[Discrepancy, ...] = records.DISCREPANCIES) -> ET.Element:
     seen, wanted = graphs.observed_graph(SUBTASK), graphs.expected_graph(SUBTASK)
     mine, other = (seen, wanted) if side == "observed" else (wanted, seen)
-    return ET.fromstring(graph_svg(mine, other, graphs.MATCHES, said, side, standalone=True))
+    return ET.fromstring(graph_svg(mine, other, graphs.MATCHES, said, side, DRAWN, standalone=True))
 
 
 def nodes(svg: ET.Element) -> dict[str, str]:
@@ -100,7 +104,7 @@ def test_changed_chips_show_both_values() -> None:
 
 def test_how_it_was_seen_shows() -> None:
     alone = ET.fromstring(
-        graph_svg(graphs.observed_graph(), None, (), (), "observed", standalone=True)
+        graph_svg(graphs.observed_graph(), None, (), (), "observed", DRAWN, standalone=True)
     )
     assert "fg-remembered" in nodes(alone)["Fridge-1"]
     assert "fg-unobserved" in nodes(alone)["Knife-1"]
@@ -118,12 +122,12 @@ def test_near_counts_only_where_a_discrepancy_speaks_of_it() -> None:
     )
     wanted = SceneGraph(seen.nodes)
     same = (("Mug-1", "Mug-1"), ("Pan-1", "Pan-1"))
-    quiet = graph_svg(seen, wanted, same, (), "observed")
+    quiet = graph_svg(seen, wanted, same, (), "observed", DRAWN)
     assert "fg-extra" not in quiet
     said = Discrepancy(
         Change.EXTRA_RELATION, "Mug-1", "", "Mug-1 left of Pan-1", "Mug-1 is left of Pan-1"
     )
-    loud = graph_svg(seen, wanted, same, (said,), "observed")
+    loud = graph_svg(seen, wanted, same, (said,), "observed", DRAWN)
     assert "fg-lane fg-extra" in loud
 
 
@@ -153,7 +157,7 @@ def test_parents_stand_above_children_and_the_gripper_apart() -> None:
         graphs.relations("Plate-1 held_by gripper", "Potato-1 on_top_of Plate-1"),
         SUBTASK,
     )
-    svg = ET.fromstring(graph_svg(graph, None, (), (), "observed", standalone=True))
+    svg = ET.fromstring(graph_svg(graph, None, (), (), "observed", DRAWN, standalone=True))
     order = list(nodes(svg))
     tops = {
         (g.find(f"{NS}text").text or ""): float(g.find(f"{NS}rect").get("y", ""))  # type: ignore[union-attr]
@@ -173,7 +177,7 @@ def test_a_thing_that_moved_is_expected_at_its_old_place() -> None:
     mug = ObjectNode("Mug-1", "Mug")
     seen = SceneGraph((table, shelf, mug), graphs.relations("Mug-1 on_top_of Table-1"))
     wanted = SceneGraph((table, shelf, mug), graphs.relations("Mug-1 on_top_of Shelf-1"))
-    svg = ET.fromstring(graph_svg(seen, wanted, (), (), "observed", standalone=True))
+    svg = ET.fromstring(graph_svg(seen, wanted, (), (), "observed", DRAWN, standalone=True))
     assert "fg-ghost" in nodes(svg)["Mug-1 expected here"]
     assert edges(svg)["Mug-1 on top of Table-1"] == "fg-edge fg-extra"
 
@@ -181,7 +185,7 @@ def test_a_thing_that_moved_is_expected_at_its_old_place() -> None:
 def test_odd_names_are_escaped_and_long_ones_cut() -> None:
     name = 'A<b>&"quoted" and far too long to be drawn in one piece'
     graph = SceneGraph((ObjectNode(name, name, (("filled", "<wine>"),)),))
-    text = graph_svg(graph, None, (), (), "observed")
+    text = graph_svg(graph, None, (), (), "observed", DRAWN)
     svg = ET.fromstring(text)
     assert "<b>" not in text
     assert name in (svg.find("g/title").text or "")  # type: ignore[union-attr]
@@ -190,8 +194,11 @@ def test_odd_names_are_escaped_and_long_ones_cut() -> None:
 
 def test_empty_graphs_and_an_expected_graph_alone() -> None:
     empty = SceneGraph(())
-    assert nodes(ET.fromstring(graph_svg(empty, empty, (), (), "observed", standalone=True))) == {}
-    alone = graph_svg(graphs.expected_graph(), None, (), (), "expected", standalone=True)
+    assert (
+        nodes(ET.fromstring(graph_svg(empty, empty, (), (), "observed", DRAWN, standalone=True)))
+        == {}
+    )
+    alone = graph_svg(graphs.expected_graph(), None, (), (), "expected", DRAWN, standalone=True)
     assert "expected scene graph" in alone
     assert "Book-1" in nodes(ET.fromstring(alone))
 
@@ -208,7 +215,7 @@ names = st.sampled_from([f"{c}-{i}" for c in ("Mug", "Plate", "CounterTop") for 
 def any_graph(draw_from: st.DrawFn) -> SceneGraph:
     ids = sorted(draw_from(st.sets(names, min_size=1, max_size=15)))
     some = st.sampled_from(ids)
-    edge = st.builds(Relation, some, st.sampled_from(sorted(RELATIONS)), some)
+    edge = st.builds(Relation, some, st.sampled_from(sorted(shipped("household").relations)), some)
     states = st.sampled_from([("dirty", "clean"), ("dirty", "dirty"), ("filled", None)])
     return SceneGraph(
         tuple(ObjectNode(i, i.split("-")[0], (draw_from(states),)) for i in ids),
@@ -223,8 +230,8 @@ def test_any_pair_is_drawn_without_overlap_and_the_same_each_time(
     seen: SceneGraph, wanted: SceneGraph
 ) -> None:
     for side, mine, other in (("observed", seen, wanted), ("expected", wanted, seen)):
-        text = graph_svg(mine, other, (), (), side, standalone=True)  # type: ignore[arg-type]
+        text = graph_svg(mine, other, (), (), side, DRAWN, standalone=True)  # type: ignore[arg-type]
         svg = ET.fromstring(text)
         assert {n.id for n in mine.nodes} <= nodes(svg).keys()
         assert_apart(svg)
-        assert text == graph_svg(mine, other, (), (), side, standalone=True)  # type: ignore[arg-type]
+        assert text == graph_svg(mine, other, (), (), side, DRAWN, standalone=True)  # type: ignore[arg-type]

@@ -49,9 +49,9 @@ def judged(record: dict[str, Any]) -> tuple[bool, bool | None, tuple[str, ...], 
         scenario = load_scenario(record["scenario"])
         assert scenario.task == record["task"]
         faults += scenario.faults
-    needs = apply_scene_faults(loaded.task.scene, faults, loaded.vocabulary)
-    kitchen = flat_environment(needs, loaded.vocabulary)
-    faulty = wrap(kitchen, faults, kitchen, loaded.vocabulary)
+    needs = apply_scene_faults(loaded.task.scene, faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    faulty = wrap(kitchen, faults, kitchen, loaded.domain)
     faulty.reset(record["seed"])
     for step in record["steps"]:
         faulty.execute(Subtask.parse(step))

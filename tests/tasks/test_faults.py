@@ -1,15 +1,15 @@
 import pytest
 from pydantic import BaseModel, ValidationError
 
+from forestall.domain.load import shipped
 from forestall.errors import InputError, UnknownNameError
 from forestall.tasks import faults as f
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.flat_world import flat_environment
 
-VOCABULARY = household()
+DOMAIN = shipped("household")
 NEEDS = SceneNeeds(
     objects=(ObjectNeed("Mug-1", "Mug", ("CounterTop-1",)), ObjectNeed("Pot-1", "Pot")),
     fixtures=(("Microwave-1", "open", "closed"),),
@@ -20,11 +20,11 @@ PLAN = Plan.parse(
 
 
 def _scene(**table):
-    return f.apply_scene_faults(NEEDS, [f.parse_fault(table)], VOCABULARY)
+    return f.apply_scene_faults(NEEDS, [f.parse_fault(table)], DOMAIN)
 
 
 def _plan(**table):
-    return f.apply_plan_faults(PLAN, [f.parse_fault(table)]).texts()
+    return f.apply_plan_faults(PLAN, [f.parse_fault(table)], DOMAIN).texts()
 
 
 # scene
@@ -69,7 +69,7 @@ def test_scene_faults_compose_in_order():
             ),
             f.parse_fault({"kind": "drop_step", "step": "pick_up(Mug)"}),
         ],
-        VOCABULARY,
+        DOMAIN,
     )
     assert needs.objects[-1].states == (("dirty", "dirty"),)
 
@@ -185,16 +185,17 @@ def test_faults_embed_in_a_file_schema():
 
 
 def _run(*tables, steps):
-    inner = flat_environment(NEEDS, VOCABULARY)
-    env = f.wrap(inner, [f.parse_fault(t) for t in tables], inner)
+    inner = flat_environment(NEEDS, DOMAIN)
+    env = f.wrap(inner, [f.parse_fault(t) for t in tables], inner, DOMAIN)
     env.reset(0)
     return inner, env, [env.execute(Subtask.parse(s)) for s in steps]
 
 
 def test_without_execution_faults_the_environment_is_not_wrapped():
-    inner = flat_environment(NEEDS, VOCABULARY)
+    inner = flat_environment(NEEDS, DOMAIN)
     assert (
-        f.wrap(inner, [f.parse_fault({"kind": "remove_object", "object": "Mug"})], inner) is inner
+        f.wrap(inner, [f.parse_fault({"kind": "remove_object", "object": "Mug"})], inner, DOMAIN)
+        is inner
     )
 
 
@@ -204,7 +205,7 @@ def test_drop_runs_the_skill_and_then_loses_the_object_once():
     assert outcomes[-1].status is SkillStatus.SUCCEEDED
     assert outcomes[-1].duration_s > 0
     assert inner.oracle.truth().holding is None
-    assert inner.oracle.truth().parents("Mug-1") == ("Floor-1",)
+    assert inner.oracle.truth().parents("Mug-1", DOMAIN.containing) == ("Floor-1",)
     for step in steps:
         env.execute(Subtask.parse(step))
     assert inner.oracle.truth().holding == "Mug-1"
@@ -247,7 +248,7 @@ def test_wrong_object_and_wrong_receptacle():
         {"kind": "wrong_receptacle", "step": "put_in(Mug, Sink)", "acts_on": "GarbageCan"},
         steps=["pick_up(Mug)", "put_in(Mug, Sink)"],
     )
-    assert inner.oracle.truth().parents("Mug-1") == ("GarbageCan-1",)
+    assert inner.oracle.truth().parents("Mug-1", DOMAIN.containing) == ("GarbageCan-1",)
 
 
 def test_an_instance_in_a_fault_means_only_that_instance():

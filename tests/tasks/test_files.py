@@ -59,9 +59,10 @@ places = ["CounterTop"]
 
 [categories.Ladle]
 words = "ladle"
-pickupable = true
+tags = ["pickupable"]
 attributes = ["dirty"]
-shape = { kind = "box", size_m = [0.28, 0.06, 0.04] }
+size_m = [0.28, 0.06, 0.04]
+world = { shape = { kind = "box" } }
 """
 
 
@@ -80,7 +81,7 @@ def test_a_task_of_ones_own_with_an_object_of_ones_own(tmp_path: Path) -> None:
     path = tmp_path / "fetch-ladle.toml"
     path.write_text(OWN)
     loaded = load_task(str(path))
-    assert loaded.vocabulary.accepts("CounterTop-1", "Ladle-1")
+    assert loaded.domain.accepts("CounterTop-1", "Ladle-1")
     assert loaded.task.scene.objects[0].id == "Ladle-1"
     assert str(loaded.task.goal.literals[0]) == "on_top_of(?ladle, DiningTable)"
 
@@ -166,15 +167,15 @@ def test_a_task_with_an_attribute_of_its_own(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(RIPE, encoding="utf-8")
     loaded = load_task(str(path))
-    words = loaded.vocabulary
+    words = loaded.domain
     assert words["Tomato"].attributes == ("sliced", "temperature", "ripe")
     assert words["Tomato"].synonyms[-1] == "love apple"
-    assert words["Tomato"].slices_into == "TomatoSliced"
+    assert words.static("slices_into", "Tomato", "TomatoSliced")
     assert words.phrases("Tomato", "ripe", "ripe") == ("a red tomato",)
     assert words.phrases("Fridge", "open", "open") == ("a fridge ajar",)
     assert loaded.task.scene.objects[0].states == (("ripe", "ripe"),)
     assert str(loaded.task.goal.literals[1]) == "ripe(?tomato)=ripe"
-    assert "ripe" not in load_task("make-salad").vocabulary.attributes
+    assert "ripe" not in load_task("make-salad").domain.attributes
 
 
 @pytest.mark.parametrize(

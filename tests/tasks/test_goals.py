@@ -2,18 +2,21 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.goals import TruthGoalChecker, irreversible
 from forestall.types.episode import Event
 from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.task import Goal
 
+DOMAIN = shipped("household")
+
 
 @dataclass
 class _Oracle:
     graph: SceneGraph
     gone_bad: frozenset[str] = frozenset()
-    history: tuple[Event, ...] = field(default_factory=tuple)
+    told: tuple[Event, ...] = field(default_factory=tuple)
 
     def truth(self):
         return self.graph
@@ -22,11 +25,11 @@ class _Oracle:
         node = self.graph.get(instance)
         return {} if node is None else dict(node.states)
 
-    def spoiled(self):
-        return self.gone_bad
+    def history(self):
+        return frozenset(Literal("spoiled", (x,)) for x in self.gone_bad)
 
     def events(self):
-        return self.history
+        return self.told
 
 
 def _node(name, **states):
@@ -44,7 +47,8 @@ def _goal(*literals, never=(), weak=(), **variables):
 
 
 def _check(goal, graph, spoiled=(), events=()):
-    return TruthGoalChecker().check(goal, _Oracle(graph, frozenset(spoiled), tuple(events)))
+    oracle = _Oracle(graph, frozenset(spoiled), tuple(events))
+    return TruthGoalChecker(DOMAIN).check(goal, oracle)
 
 
 MUGS = SceneGraph(
@@ -152,7 +156,7 @@ def test_a_variable_that_only_the_weak_check_uses_does_not_matter_to_the_strict_
 
 
 def _harm(goal, graph, spoiled=(), events=()):
-    return irreversible(goal, _Oracle(graph, frozenset(spoiled), tuple(events)))
+    return irreversible(goal, _Oracle(graph, frozenset(spoiled), tuple(events)), DOMAIN)
 
 
 def test_nothing_irreversible_has_happened():

@@ -6,12 +6,14 @@ from collections import Counter
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults
 from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
 from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.environment import KitchenEnvironment
+
+pytestmark = pytest.mark.simulator
 
 NAMES = scenario_names("harmless")
 KINDS = {
@@ -38,21 +40,21 @@ def test_they_change_the_scene_and_leave_task_and_plan_alone() -> None:
     for name in NAMES:
         scenario = load_scenario(name)
         task = load_task(scenario.task).task
-        needs = apply_scene_faults(task.scene, scenario.faults, household())
+        needs = apply_scene_faults(task.scene, scenario.faults, shipped("household"))
         assert needs.undisturbed == task.scene
         assert needs != task.scene
         assert needs.objects[: len(task.scene.objects)] == task.scene.objects
-        assert apply_plan_faults(task.plan, scenario.faults) == task.plan
+        assert apply_plan_faults(task.plan, scenario.faults, shipped("household")) == task.plan
 
 
 @pytest.mark.parametrize("name", SAMPLE)
 def test_the_plan_succeeds_in_the_real_kitchen(name: str) -> None:
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    needs = apply_scene_faults(task.scene, scenario.faults, household())
-    env = KitchenEnvironment(needs, household())
+    needs = apply_scene_faults(task.scene, scenario.faults, shipped("household"))
+    env = KitchenEnvironment(needs, shipped("household"))
     env.reset(10_000 + NAMES.index(name) % 10)
     for subtask in task.plan:
         outcome = env.execute(subtask)
         assert outcome.status is SkillStatus.SUCCEEDED, (str(subtask), outcome.reason)
-    assert TruthGoalChecker().check(task.goal, env.oracle)[0]
+    assert TruthGoalChecker(shipped("household")).check(task.goal, env.oracle)[0]

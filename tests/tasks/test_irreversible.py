@@ -54,31 +54,34 @@ class Run:
             self.faulty.execute(Subtask.parse(step) if isinstance(step, str) else step)
 
     def harmed(self) -> tuple[tuple[float, str], ...]:
-        return irreversible(self.loaded.task.goal, self.kitchen.oracle)
+        return irreversible(self.loaded.task.goal, self.kitchen.oracle, self.loaded.domain)
 
     def checked(self) -> tuple[bool, bool | None, tuple[str, ...]]:
-        return TruthGoalChecker().check(self.loaded.task.goal, self.kitchen.oracle)
+        return TruthGoalChecker(self.loaded.domain).check(
+            self.loaded.task.goal, self.kitchen.oracle
+        )
 
     def planned(self) -> Planned:
-        truth = observed(self.kitchen.oracle.truth(), self.loaded.vocabulary)
+        truth = observed(self.kitchen.oracle.truth(), self.loaded.domain)
         return plan_goal(truth, self.loaded.task.goal, QUICK)
 
 
 def started(name: str, seed: int) -> Run:
     scenario = load_scenario(name)
     loaded = load_task(scenario.task)
-    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.vocabulary)
-    plan = apply_plan_faults(loaded.task.plan, scenario.faults)
-    check_steps(plan, scenario.faults, loaded.vocabulary)
-    kitchen = flat_environment(needs, loaded.vocabulary)
-    faulty = wrap(kitchen, scenario.faults, kitchen, loaded.vocabulary)
+    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.domain)
+    plan = apply_plan_faults(loaded.task.plan, scenario.faults, loaded.domain)
+    check_steps(plan, scenario.faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    faulty = wrap(kitchen, scenario.faults, kitchen, loaded.domain)
     faulty.reset(seed)
     return Run(scenario, loaded, plan, kitchen, faulty)
 
 
 def moments(name: str) -> tuple[int, int]:
     scenario = load_scenario(name)
-    plan = apply_plan_faults(load_task(scenario.task).task.plan, scenario.faults)
+    loaded = load_task(scenario.task)
+    plan = apply_plan_faults(loaded.task.plan, scenario.faults, loaded.domain)
     known, effect = scenario.moments(plan)
     assert known is not None and effect is not None
     return known, effect
@@ -90,7 +93,7 @@ def wash_up(run: Run) -> None:
     run.execute("toggle_off(Microwave)", "open_obj(Microwave)", "open_obj(Fridge)")
     for node in home.nodes:
         used = node.state("dirty") == "dirty" or node.state("filled") not in (None, "empty")
-        if used and run.loaded.vocabulary[node.id].pickupable:
+        if used and run.loaded.domain.is_a(node.id, "pickupable"):
             held = run.kitchen.oracle.truth().holding
             if held is not None:
                 run.execute(f"put_on({held}, CounterTop)")

@@ -4,6 +4,7 @@ from collections import Counter
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.faults import (
     apply_plan_faults,
     apply_scene_faults,
@@ -16,10 +17,10 @@ from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
+DOMAIN = shipped("household")
 SOURCES = {
     "boil-water": "boilWater",
     "cook-egg": "cookEgg",
@@ -57,15 +58,15 @@ NAMES = scenario_names("robofail")
 
 
 def _plan(scenario: Scenario) -> Plan:
-    return apply_plan_faults(load_task(scenario.task).task.plan, scenario.faults)
+    return apply_plan_faults(load_task(scenario.task).task.plan, scenario.faults, DOMAIN)
 
 
 def _play(scenario: Scenario, seed: int) -> tuple[KitchenEnvironment, list[tuple[int, str]]]:
     """Run the starting plan unwatched; the world and every (position, reason) of a refusal."""
     loaded = load_task(scenario.task)
-    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.vocabulary)
-    kitchen = flat_environment(needs, loaded.vocabulary)
-    env = wrap(kitchen, scenario.faults, kitchen, loaded.vocabulary)
+    needs = apply_scene_faults(loaded.task.scene, scenario.faults, loaded.domain)
+    kitchen = flat_environment(needs, loaded.domain)
+    env = wrap(kitchen, scenario.faults, kitchen, loaded.domain)
     env.reset(seed)
     refused = []
     for at, subtask in enumerate(_plan(scenario)):
@@ -95,7 +96,7 @@ def test_a_scenario_fits_its_task_and_says_when_it_can_be_known(name: str) -> No
     scenario = load_scenario(name)
     loaded = load_task(scenario.task)
     plan = _plan(scenario)
-    check_steps(plan, scenario.faults, loaded.vocabulary)
+    check_steps(plan, scenario.faults, loaded.domain)
     known, effect = scenario.moments(plan)
     assert known is not None and effect is not None
     broken = name in BROKEN_BY_FALLING
@@ -115,7 +116,7 @@ def test_nobody_steps_in_and_the_task_fails(name: str) -> None:
     assert known is not None and effect is not None
     for seed in (10_000, 10_001):
         kitchen, refused = _play(scenario, seed)
-        strict, _, why = TruthGoalChecker().check(goal, kitchen.oracle)
+        strict, _, why = TruthGoalChecker(DOMAIN).check(goal, kitchen.oracle)
         assert not strict and why
         late = [step for step, _ in refused if step >= known]
         if scenario.kind in SLIPS and name not in BROKEN_BY_FALLING:
@@ -180,8 +181,8 @@ MIXED_UP = parse_fault(
 def _mixed_up(*steps: str) -> KitchenEnvironment:
     """A kitchen in which a bowl is taken for the mug, after some steps that must all work."""
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"), ObjectNeed("Bowl-1", "Bowl")))
-    kitchen = flat_environment(needs, household())
-    env = wrap(kitchen, [MIXED_UP], kitchen)
+    kitchen = flat_environment(needs, DOMAIN)
+    env = wrap(kitchen, [MIXED_UP], kitchen, DOMAIN)
     env.reset(0)
     for step in steps:
         outcome = env.execute(Subtask.parse(step))
@@ -203,14 +204,14 @@ def test_the_mistake_ends_when_a_step_names_the_wrong_thing() -> None:
 def test_the_mistake_ends_when_it_has_happened_often_enough() -> None:
     again = ("pick_up(Mug)", "put_on(Mug, DiningTable)")
     kitchen = _mixed_up(*again, *again, *again)
-    assert kitchen.oracle.truth().parents("Mug-1") == ("DiningTable-1",)
-    assert kitchen.oracle.truth().parents("Bowl-1") == ("DiningTable-1",)
+    assert kitchen.oracle.truth().parents("Mug-1", DOMAIN.containing) == ("DiningTable-1",)
+    assert kitchen.oracle.truth().parents("Bowl-1", DOMAIN.containing) == ("DiningTable-1",)
 
 
 def test_a_reset_ends_the_mistake() -> None:
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"), ObjectNeed("Bowl-1", "Bowl")))
-    kitchen = flat_environment(needs, household())
-    env = wrap(kitchen, [MIXED_UP], kitchen)
+    kitchen = flat_environment(needs, DOMAIN)
+    env = wrap(kitchen, [MIXED_UP], kitchen, DOMAIN)
     env.reset(0)
     env.execute(Subtask.parse("pick_up(Mug)"))
     env.reset(0)

@@ -82,11 +82,11 @@ CASES: dict[str, tuple[str, tuple[ObjectNeed, ...], Change, bool]] = {
 def finished(task: str, more: tuple[ObjectNeed, ...], change: Change) -> tuple[bool, object]:
     loaded = load_task(task)
     needs = replace(loaded.task.scene, objects=(*loaded.task.scene.objects, *more))
-    kitchen = flat_environment(needs, loaded.vocabulary)
+    kitchen = flat_environment(needs, loaded.domain)
     kitchen.reset(1)
     for step in change(loaded.task.plan.texts()):
         kitchen.execute(Subtask.parse(step))
-    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    strict, _, why = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
     return strict, why
 
 
@@ -113,11 +113,11 @@ def test_what_broke_on_the_way_is_not_forgotten(task: str, broken: str) -> None:
         loaded.task.scene,
         objects=(*loaded.task.scene.objects, ObjectNeed(f"{broken}-2", broken, ("CounterTop",))),
     )
-    kitchen = flat_environment(twice, loaded.vocabulary)
+    kitchen = flat_environment(twice, loaded.domain)
     kitchen.reset(1)
     kitchen.execute(Subtask.parse(f"pick_up({broken}-2)"))
     assert kitchen.drop_held(hard=True) == f"{broken}-2"
     for subtask in loaded.task.plan:
         kitchen.execute(subtask)
-    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    strict, _, why = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
     assert not strict and any("never" in w for w in why)

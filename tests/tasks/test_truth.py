@@ -18,17 +18,17 @@ def traced(task: str, scenario: str | None, seed: int = 4) -> list[TrueMoment]:
     loaded = load_task(task)
     faults = () if scenario is None else load_scenario(scenario).faults
     kitchen = flat_environment(
-        apply_scene_faults(loaded.task.scene, faults, loaded.vocabulary), loaded.vocabulary
+        apply_scene_faults(loaded.task.scene, faults, loaded.domain), loaded.domain
     )
     trace = TruthTrace()
-    trace.attach(kitchen.oracle, loaded.vocabulary)
+    trace.attach(kitchen.oracle, loaded.domain)
     Runtime(
-        wrap(kitchen, faults, kitchen, loaded.vocabulary),
-        TruthPerceiver(kitchen, loaded.vocabulary),
-        make_strategy(run_config(task, strategy="none"), loaded.vocabulary, None),
-        loaded.vocabulary,
+        wrap(kitchen, faults, kitchen, loaded.domain),
+        TruthPerceiver(kitchen, loaded.domain),
+        make_strategy(run_config(task, strategy="none"), loaded.domain, None),
+        loaded.domain,
         [trace],
-    ).run(loaded.task, apply_plan_faults(loaded.task.plan, faults), seed)
+    ).run(loaded.task, apply_plan_faults(loaded.task.plan, faults, loaded.domain), seed)
     return trace.moments
 
 

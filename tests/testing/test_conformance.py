@@ -5,7 +5,6 @@ from forestall.testing.conformance import check_environment
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.flat_world import flat_environment
 
 HOUSEHOLD = shipped("household")
@@ -13,7 +12,7 @@ STEPS = [Subtask.parse(s) for s in ("pick_up(Mug)", "put_in(Mug, Sink)", "pick_u
 
 
 def _make():
-    return flat_environment(SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"),)), household())
+    return flat_environment(SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"),)), shipped("household"))
 
 
 class _Broken:

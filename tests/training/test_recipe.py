@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.embeddings.crops import INPUT_PIXELS
 from forestall.embeddings.twotower import DESCRIPTION_NAME, TwoTowerEncoder
 from forestall.errors import FileFormatError, InputError
 from forestall.training import shards
 from forestall.training.examine import answers, vectors
 from forestall.training.measure import measure
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.recipe import Recipe, train
-from forestall.vocabulary import ATTRIBUTES, household
 
 COLOURS = {("Fridge", 0): (200, 30, 30), ("Fridge", 1): (30, 30, 200), ("Apple", 0): (30, 200, 30)}
 """Category and whether it is open → the colour in which the test paints it."""
@@ -65,7 +66,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         train(
             folder / "pictures",
             folder / "model",
-            household(),
+            shipped("household"),
             Recipe(seed=3, steps=25, batch=24),
             lambda done, total, what: told.append((done, total, what)),
         )
@@ -79,7 +80,7 @@ def test_what_was_painted_is_told_apart(trained: tuple[Path, Path]) -> None:
     crops = shards.read(pictures, "development")
     rows = vectors(encoder, crops)
     assert np.allclose(np.linalg.norm(rows, axis=1), 1, atol=1e-4)
-    found = measure(answers(encoder, rows, crops, household()))
+    found = measure(answers(encoder, rows, crops, shipped("household")))
     opened = next(g for g in found.attributes if g.attribute == "open")
     assert opened.figures.accuracy.value == 1.0
     assert opened.figures.n == 40
@@ -105,8 +106,8 @@ def test_the_same_seed_trains_the_same(trained: tuple[Path, Path], tmp_path: Pat
     pictures, _ = trained
     crops = shards.read(pictures, "train")
     config = TrainConfig(seed=5, steps=2, batch=12)
-    one, _ = fit(crops, household(), config, lambda *_: None)
-    other, _ = fit(crops, household(), config, lambda *_: None)
+    one, _ = fit(crops, shipped("household"), config, lambda *_: None)
+    other, _ = fit(crops, shipped("household"), config, lambda *_: None)
     pairs = zip(one.state_dict().values(), other.state_dict().values(), strict=True)
     assert all(torch.equal(a, b) for a, b in pairs)
 

@@ -3,11 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.training import shards
+from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, SceneConfig
 from forestall.training.shards import PictureConfig, make_shard, read
-from forestall.vocabulary import ATTRIBUTES, household
 
 SMALL = PictureConfig(1, 1, 1, 1, SceneConfig(views=2, things=(6, 8)), "embree")
 
@@ -25,7 +26,7 @@ def test_a_shard_holds_crops_with_what_is_true_of_them(folder: Path) -> None:
     assert crops.pixels.shape[1:] == (80, 80, 4) and crops.pixels.dtype == np.uint8
     assert (crops.category == "").sum() == 2 and crops.frame.max() == 1
     order = list(ATTRIBUTES)
-    vocabulary = household()
+    vocabulary = shipped("household")
     for name, values in zip(crops.category.tolist(), crops.values.tolist(), strict=True):
         known = {a for a, v in zip(order, values, strict=True) if v >= 0}
         assert "temperature" not in known
@@ -37,23 +38,25 @@ def test_a_shard_holds_crops_with_what_is_true_of_them(folder: Path) -> None:
 
 
 def test_the_same_seed_draws_the_same_pictures(folder: Path) -> None:
-    artist = Artist(household(), SMALL.scene, "embree")
+    artist = Artist(shipped("household"), SMALL.scene, "embree")
     first, second = list(artist.pictures(2_000_000))
-    again = list(Artist(household(), SMALL.scene, "embree").pictures(2_000_000))
+    again = list(Artist(shipped("household"), SMALL.scene, "embree").pictures(2_000_000))
     assert np.array_equal(first.frame.rgb, again[0].frame.rgb)
     assert second.states == again[1].states
     assert not np.array_equal(first.frame.rgb, second.frame.rgb)
 
 
 def test_nothing_else_is_true_of_what_is_broken() -> None:
-    artist = Artist(household(), SceneConfig(views=1, things=(12, 14), broken=1.0), "embree")
+    artist = Artist(
+        shipped("household"), SceneConfig(views=1, things=(12, 14), broken=1.0), "embree"
+    )
     (picture,) = artist.pictures(77)
     broken = [s for s in picture.states.values() if s.get("broken") == "broken"]
     assert broken and all(s == {"broken": "broken"} for s in broken)
 
 
 def test_things_that_are_not_trained_on_are_drawn_too(folder: Path) -> None:
-    found = set(shards.unseen_things().categories) - set(household().categories)
+    found = set(shards.unseen_things().categories) - set(shipped("household").categories)
     assert found >= {"Jug", "Tray"}
     assert set(read(folder, "unseen").category.tolist()) & found
 

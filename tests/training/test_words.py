@@ -4,17 +4,17 @@ from pathlib import Path
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
 from forestall.embeddings.tokens import words
 from forestall.errors import FileFormatError, UnknownNameError
 from forestall.training.words import GROUPS, Word, accuracy, nearest, word_list
-from forestall.vocabulary import household
 
 LIST = word_list()
 
 
 def names(category: str) -> tuple[str, ...]:
-    found = household()[category]
+    found = shipped("household")[category]
     return (found.words, *found.synonyms)
 
 
@@ -29,7 +29,7 @@ def shares_a_part(word: Word) -> bool:
 
 
 def test_no_word_is_a_name_of_the_vocabulary() -> None:
-    vocabulary = household()
+    vocabulary = shipped("household")
     taken = {n.lower() for c in vocabulary.categories for n in (c, *names(c))}
     assert not taken & {w.word.lower() for w in LIST}
     assert len({w.word.lower() for w in LIST}) == len(LIST) >= 80
@@ -42,7 +42,7 @@ def test_every_word_is_in_its_group(word: Word) -> None:
 
 
 def test_spelling_is_all_that_hashing_knows() -> None:
-    rows = nearest(HashedTextEncoder(), LIST, household())
+    rows = nearest(HashedTextEncoder(), LIST, shipped("household"))
     assert [r.word for r in rows] == list(LIST)
     spelling, meaning = (accuracy(rows, g) for g in GROUPS)
     assert spelling is not None and 0.6 < spelling < 0.9
@@ -54,18 +54,18 @@ def test_spelling_is_all_that_hashing_knows() -> None:
 
 
 def test_a_name_itself_is_placed_with_certainty() -> None:
-    (row,) = nearest(HashedTextEncoder(), [Word("skillet", "meaning", "Pan")], household())
+    (row,) = nearest(HashedTextEncoder(), [Word("skillet", "meaning", "Pan")], shipped("household"))
     assert row.right and row.name == "skillet" and row.similarity == pytest.approx(1.0, abs=1e-5)
 
 
 def test_accuracy_of_nothing_is_unknown() -> None:
-    rows = nearest(HashedTextEncoder(), [Word("wok", "meaning", "Pan")], household())
+    rows = nearest(HashedTextEncoder(), [Word("wok", "meaning", "Pan")], shipped("household"))
     assert accuracy(rows, "spelling") is None and accuracy([]) is None
 
 
 def test_an_unknown_category_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="Pann"):
-        nearest(HashedTextEncoder(), [Word("wok", "meaning", "Pann")], household())
+        nearest(HashedTextEncoder(), [Word("wok", "meaning", "Pann")], shipped("household"))
 
 
 @pytest.mark.parametrize("text", ["[smell]\nwok = 'Pan'", "meaning = 'Pan'", "[meaning"])

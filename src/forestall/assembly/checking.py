@@ -10,6 +10,7 @@ from pathlib import Path
 
 from forestall.assembly.configuration import Given, choices
 from forestall.assembly.make import STORED_STATES
+from forestall.assembly.options import built
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import find, known
 from forestall.domain.model import Domain
@@ -59,7 +60,7 @@ def judge_stored(
         raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)
     loaded = None if task is None else load_task(task)
     own = find(DOMAIN.name, names[DOMAIN.name])
-    domain: Domain = own.factory() if loaded is None else loaded.domain
+    domain: Domain = built(own, {}, None) if loaded is None else loaded.domain
     wanted = domain.check(Subtask.parse(subtask))
     for name in wanted.args:
         domain[name]

@@ -39,6 +39,9 @@ SWITCHES: Mapping[str, str] = {
 WITHOUT = (*SWITCHES, "reasoning", "validation")
 """Everything that a run can do without."""
 
+NAME = "name"
+"""What a part is called, where its options stand, too; no option has this name."""
+
 RUN_KEYS = ("scenario", "seed", "without")
 """What a configuration file may say besides its tables of parts."""
 
@@ -99,7 +102,7 @@ class Given:
 
         Args:
             values: kind or short name → the part's name, or a table of "name" and options; dots
-                (`detector.threshold`) name one option.
+                (`detector.threshold`) name one option, `detector.name` the part.
 
         Raises:
             UnknownNameError: no such kind or short name.
@@ -113,11 +116,13 @@ class Given:
             if kind not in TABLES:
                 raise UnknownNameError("part", key, (*TABLES, *SHORT))
             name, options = found.get(kind, (None, {}))
-            if dot or short:
+            if option == NAME:
+                name = str(value)
+            elif dot or short:
                 options = {**options, (option or short or ""): value}
             elif isinstance(value, Mapping):
-                name = value.get("name", name)
-                options = {**options, **{k: v for k, v in value.items() if k != "name"}}
+                name = value.get(NAME, name)
+                options = {**options, **{k: v for k, v in value.items() if k != NAME}}
             else:
                 name = str(value)
             found[kind] = (name, options)

@@ -22,7 +22,7 @@ from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.domain.model import Domain
 from forestall.embeddings.views import view_of
 from forestall.errors import ForestallError
-from forestall.fingerprint import sources_digest
+from forestall.fingerprint import sources_digest, weights_of
 from forestall.kinds import (
     CAPTIONER,
     IMAGE_ENCODER,
@@ -47,9 +47,6 @@ TRIES = 5
 
 RECORDED = tuple(k.name for k in (WORLD, SEGMENTER, STATES, PERCEIVER, IMAGE_ENCODER, CAPTIONER))
 """The kinds of parts that a demonstration depends on."""
-
-MODELS = ("FORESTALL_BLIP", "FORESTALL_CLIP")
-"""Variables that say which weights of others are meant."""
 
 Progress = Callable[[int, int, str], None]
 
@@ -212,9 +209,9 @@ def ready_made(
     name = loaded.task.name
     parts = [(c.kind, c.name, sorted(c.options.items())) for c in config.choices]
     parts = [p for p in parts if p[0] in RECORDED]
-    models = [os.environ.get(variable) for variable in MODELS]
+    weights = weights_of(p[1] for p in parts)
     key = sources_digest(
-        [forestall.__version__, KITCHENS_PER_TASK, TRIES, repr(loaded), parts, models]
+        [forestall.__version__, KITCHENS_PER_TASK, TRIES, repr(loaded), parts, weights]
     )
     path = cache_dir() / "memory" / f"{name}-{key}.db"
     if path.exists():

@@ -81,6 +81,8 @@ def declared(factory: Callable[..., Any]) -> Declared:
         else:
             options = _fields(config, settled, parameter.name)
         for option in options:
+            if option.name == "name":
+                raise TypeError("it declares the option 'name', which means the part itself")
             if option.name in found:
                 raise TypeError(f"it declares the option {option.name!r} twice")
             found[option.name] = option

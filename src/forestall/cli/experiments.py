@@ -36,7 +36,7 @@ class Options:
         strategies: only runs of these: watch (all detectors judge), none, proactive, online,
             online-scene, post-hoc. Without watch there are no figures of detectors.
         out: folder of the results; what is finished in it is not run again.
-        engine: local (processes) or ray.
+        engine: local (processes), ray, or inline (this process, one after the other).
         address: of a running Ray cluster; a local one is started by default.
         pages: which episodes get a page of their own (1.5 MB each): all, telling (the proactive
             runs of failing cases, and those with a false alarm) or none.

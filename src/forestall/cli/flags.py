@@ -1,8 +1,8 @@
 """Flags that say which parts a command works with, and how their options are spelt.
 
-`--detector.threshold 0.85` is short for `--set detector.threshold=0.85`; every kind of part and
-every option of a part can be said that way, in any command that takes parts. A file (`--config`)
-says the same; flags come over it.
+`--detector.threshold 0.85` is short for `--set detector.threshold=0.85`; every option of a part can
+be said that way, and every part (`--reasoner.name none`), in any command that takes parts.
+A file (`--config`) says the same; flags come over it.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
     if schema:
         print(json.dumps(schemas()["task"], indent=2))
         return 0
-    loaded = [load_task(name).task for name in task_names()]
+    loaded = [load_task(name).task for name in task_names(None)]
     if as_json:
         rows = [
             {
@@ -67,7 +67,7 @@ def scenarios(
         return 0
     if task is not None:
         load_task(task)
-    names = scenario_names(None if of == "all" else of)
+    names = scenario_names(None if of == "all" else of, None)
     loaded = [s for s in map(load_scenario, names) if task in (None, s.task)]
     if as_json:
         rows = [

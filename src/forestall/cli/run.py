@@ -43,7 +43,7 @@ def run(
         quiet: no progress on standard error.
     """
     from forestall.assembly.configuration import run_config
-    from forestall.assembly.make import needs_memory, prepare, provenance, run_episode
+    from forestall.assembly.make import needs_memory, prepare, run_episode
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
@@ -61,13 +61,7 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     demonstrations, used = memory_of(config, quiet) if needs_memory(config) else (None, None)
     page = folder / "index.html"
-    recorder = RunRecorder(
-        folder,
-        scenario=name,
-        strategy=strategy,
-        provenance={**dict(provenance(config)), "memory": used},
-        page=str(page),
-    )
+    recorder = RunRecorder(folder, page=str(page))
     with ProgressLine(quiet=quiet) as line:
         record = run_episode(prepared, demonstrations, [recorder, line], used)
     write_page(record, page)

@@ -20,7 +20,7 @@ class NoReasoning:
     """Names what the goal still lacks in place of a cause (implements `Reasoner`).
 
     Args:
-        domain: the categories.
+        domain: what is planned in.
     """
 
     name = "none"

@@ -62,6 +62,12 @@ def check_domain(domain: Domain) -> None:
         if rule.when not in ("", "leaving", *domain.skills):
             raise UnknownNameError(f"when of {label}", rule.when, ("leaving", *domain.skills))
     _roles(domain)
+    for thing, category in domain.constants:
+        if category not in domain.categories:
+            raise _with_keys(
+                UnknownNameError(f"category of constant {thing}", category, domain.categories),
+                "[constants]",
+            )
     for name in domain.robot.skills:
         if name not in domain.skills:
             raise UnknownNameError("skill of the robot", name, domain.skills)

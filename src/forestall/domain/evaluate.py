@@ -6,6 +6,7 @@ Three values: 0 false, 1 unobserved, 2 true; "and" is the smaller, "or" the larg
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Protocol, TypeVar
 
@@ -21,7 +22,15 @@ from forestall.domain.formula import (
     free,
     normal,
 )
-from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain, PredicateKind
+from forestall.domain.model import (
+    FACING,
+    LOCATED,
+    SAME,
+    SAME_CATEGORY,
+    Domain,
+    Predicate,
+    PredicateKind,
+)
 from forestall.types.facts import Literal, category_of, is_instance
 
 FALSE, UNOBSERVED, TRUE = 0, 1, 2
@@ -123,9 +132,9 @@ def _truth_of(predicate: str, args: tuple[str, ...], view: View) -> int:
             return UNOBSERVED
         return TRUE if predicate in domain.kinds(view.category(args[0])) else FALSE
     if known.kind is PredicateKind.DERIVED:
-        assert known.definition is not None
-        binding = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
-        return evaluate(_normal(known.definition), view, binding)
+        if predicate in domain.recursive:
+            return _recursive_truth(known, args, view)
+        return _defined_truth(known, args, view)
     if UNKNOWN in args:
         return UNOBSERVED
     if known.kind is PredicateKind.STATIC:
@@ -133,10 +142,67 @@ def _truth_of(predicate: str, args: tuple[str, ...], view: View) -> int:
     return view.fact(predicate, args)
 
 
+def _defined_truth(known: Predicate, args: tuple[str, ...], view: View) -> int:
+    assert known.definition is not None
+    binding = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
+    return evaluate(_normal(known.definition), view, binding)
+
+
+class _Circle:
+    """What is known so far of predicates that are defined with each other, in one view."""
+
+    def __init__(self, view: View, members: frozenset[str]) -> None:
+        self.view, self.members = view, members
+        self.found: dict[tuple[str, ...], int] = {}
+        self.asked: set[tuple[str, ...]] = set()
+        self.open: set[tuple[str, ...]] = set()
+        self.rose = self.closed = False
+
+    def ask(self, known: Predicate, args: tuple[str, ...]) -> int:
+        key = (known.name, *args)
+        if key in self.asked:
+            self.closed |= key in self.open
+            return self.found.get(key, FALSE)
+        self.asked.add(key)
+        self.open.add(key)
+        truth = max(_defined_truth(known, args, self.view), self.found.get(key, FALSE))
+        self.open.discard(key)
+        self.rose |= truth > self.found.get(key, FALSE)
+        self.found[key] = truth
+        return truth
+
+
+class _Circles(threading.local):
+    def __init__(self) -> None:
+        self.stack: list[_Circle] = []
+
+
+_circles = _Circles()
+
+
+def _recursive_truth(known: Predicate, args: tuple[str, ...], view: View) -> int:
+    """The least fixpoint, so that facts that go in a circle support nothing."""
+    stack = _circles.stack
+    members = view.domain.recursive[known.name]
+    if stack and stack[-1].view is view and stack[-1].members == members:
+        return stack[-1].ask(known, args)
+    circle = _Circle(view, members)
+    stack.append(circle)
+    try:
+        while True:
+            truth = circle.ask(known, args)
+            if not (circle.rose and circle.closed):
+                return truth
+            circle.asked.clear()
+            circle.rose = circle.closed = False
+    finally:
+        stack.pop()
+
+
 def static_holds(view: View, predicate: str, args: tuple[str, ...]) -> bool:
     """Whether a static predicate holds between things (or a thing and a category)."""
     domain = view.domain
-    kinds = tuple(view.category(a) if is_instance(a) else category_of(a) for a in args)
+    kinds = tuple(view.category(a) for a in args)
     if kinds not in domain.statics.get(predicate, ()):
         return False
     paired = domain.predicates[predicate].paired

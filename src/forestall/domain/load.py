@@ -33,7 +33,7 @@ from forestall.errors import DomainError, FileFormatError, InputError, UnknownNa
 
 _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
-    "skills", "processes", "safety",
+    "skills", "processes", "safety", "constants", "spelling",
 )  # fmt: skip
 _ATTRIBUTE = (
     "values", "phrases", "by_category", "camera", "lasting", "mined", "bins", "unit", "words",
@@ -71,6 +71,10 @@ def load_domain(name_or_file: str) -> Domain:
         FileFormatError: the file cannot be read.
         DomainError: something in it is wrong.
     """
+    if name_or_file.endswith(".pddl"):
+        from forestall.domain.pddl_in import load_pddl
+
+        return load_pddl(name_or_file)
     if not name_or_file.endswith(".toml"):
         return shipped(name_or_file)
     try:
@@ -141,6 +145,8 @@ def build_domain(data: Mapping[str, Any]) -> Domain:
         ),
         roles=_record(Roles, "roles", data.get("roles", {})),
         robot=_record(Robot, "robot", data.get("robot", {})),
+        constants=_pairs("constants", data),
+        spelling=_pairs("spelling", data),
     )
     check_domain(domain)
     return domain
@@ -183,8 +189,8 @@ def _open_facts(
 ) -> set[tuple[str, ...]]:
     spec = dict(domain.categories[name].extra).get(f"#{predicate}", ())
     assert isinstance(spec, tuple)
-    chosen = _chosen(domain, predicate, name, spec)
-    return {(name, other) for other in chosen if other in new}
+    found = chosen(domain, predicate, name, spec)
+    return {(name, other) for other in found if other in new}
 
 
 # --- predicates -----------------------------------------------------------------------------------
@@ -274,6 +280,7 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
         fine=table.get("fine", start.fine),
         obscures=table.get("obscures", start.obscures),
         says={**start.says, **as_table(f"{label}: says", table.get("says", {}))},
+        mined=table.get("mined", start.mined),
         lasting=table.get("lasting", start.lasting if base else bool(domain.categories)),
     )
 
@@ -329,14 +336,18 @@ def _facts(
 ) -> None:
     for predicate in _statics(domain):
         spec = _names(f"category {name}", predicate, table)
-        statics[predicate] |= {(name, x) for x in _chosen(domain, predicate, name, spec)}
+        statics[predicate] |= {(name, x) for x in chosen(domain, predicate, name, spec)}
     for word, predicate in _inverse(domain).items():
         spec = _names(f"category {name}", word, table)
-        statics[predicate] |= {(x, name) for x in _chosen(domain, word, name, spec)}
+        statics[predicate] |= {(x, name) for x in chosen(domain, word, name, spec)}
 
 
-def _chosen(domain: Domain, predicate: str, name: str, spec: Sequence[str]) -> set[str]:
-    """Categories of a list: names, "#tag" for all with a tag, "-Name" for all but."""
+def chosen(domain: Domain, predicate: str, name: str, spec: Sequence[str]) -> set[str]:
+    """Categories of a category's list: names, "#tag" for all with a tag, "-Name" for all but.
+
+    Raises:
+        UnknownNameError: a tag or category that does not exist.
+    """
     found: set[str] = set()
     for entry in (e for e in spec if not e.startswith("-")):
         if entry.startswith("#"):
@@ -375,6 +386,14 @@ def _record(kind: Any, label: str, data: Any) -> Any:
     table = as_table(label, data)
     _known(label, table, [f.name for f in fields(kind)])
     return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+
+
+def _pairs(key: str, data: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    table = as_table(key, data.get(key, {}))
+    for name, value in table.items():
+        if not isinstance(value, str):
+            raise _keyed(InputError(f"{key}: {name} must be a text"), f"[{key}]")
+    return tuple(table.items())
 
 
 def _known(label: str, table: Mapping[str, Any], known: Sequence[str]) -> None:

@@ -43,6 +43,8 @@ class Predicate:
         camera: whether a picture can show it.
         contains: whether it says where a thing is: the first argument in, on or at the second.
         group: relations of one group exclude each other for one first argument.
+        symmetric: whether a relation holds from both ends.
+        mirrors: the relation that says the same from the other end, which is said instead.
         scored: whether the comparison counts it, and a graph for one subtask keeps it.
         geometry: how perception finds it: "containment", "support", "" for neither.
         offered_by: tag of the things that take others in this relation.
@@ -73,6 +75,8 @@ class Predicate:
     camera: bool = True
     contains: bool = False
     group: str | None = None
+    symmetric: bool = False
+    mirrors: str = ""
     scored: bool = False
     geometry: str = ""
     offered_by: str = ""
@@ -361,7 +365,22 @@ BUILT_IN = (LOCATED, FACING, SAME, SAME_CATEGORY)
 
 @dataclass(frozen=True)
 class Domain:
-    """Everything that differs between a kitchen, a bench and a warehouse."""
+    """Everything that differs between a kitchen, a bench and a warehouse.
+
+    Args:
+        name: of the domain.
+        categories: by name.
+        predicates: by name.
+        skills: by name.
+        statics: static predicate → the categories between which it holds.
+        tags: every tag that a category may have.
+        processes: what happens by itself, in the order of the file.
+        safety: what must never be true.
+        roles: predicates and tags by the part that they play for the engine.
+        robot: its hands, and its skills where it has not all of them.
+        constants: (thing, category) of the things that every scene has.
+        spelling: (name, how the file that it was read from spells it), where they differ.
+    """
 
     name: str
     categories: Mapping[str, Category] = field(hash=False)
@@ -373,6 +392,8 @@ class Domain:
     safety: tuple[SafetyRule, ...] = ()
     roles: Roles = Roles()
     robot: Robot = Robot()
+    constants: tuple[tuple[str, str], ...] = ()
+    spelling: tuple[tuple[str, str], ...] = ()
 
     def __hash__(self) -> int:
         return hash(self.name)
@@ -593,6 +614,29 @@ class Domain:
         texts = kind.by_category.get(thing.name, {}).get(value) or kind.phrases.get(value)
         texts = texts or (f"a {value.replace('_', ' ')} {THING}",)
         return tuple(with_articles(t.replace(THING, thing.spoken)) for t in texts)
+
+    @cached_property
+    def recursive(self) -> dict[str, frozenset[str]]:
+        """Derived predicate → those that it is defined with in a circle, itself included."""
+        uses = {
+            p.name: {x.predicate for x, _ in literals(p.definition) if x.predicate in self.derived}
+            for p in self.derived.values()
+            if p.definition is not None
+        }
+        reached: dict[str, set[str]] = {}
+        for name, used in uses.items():
+            found, left = set[str](), list(used)
+            while left:
+                other = left.pop()
+                if other not in found:
+                    found.add(other)
+                    left += uses[other]
+            reached[name] = found
+        return {
+            name: frozenset(o for o in found if name in reached[o])
+            for name, found in reached.items()
+            if name in found
+        }
 
     # --- skills ----------------------------------------------------------------------------------
 

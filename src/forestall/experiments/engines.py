@@ -1,4 +1,4 @@
-"""Where episodes are computed: processes of this machine, or workers of a Ray cluster.
+"""Where episodes are computed: processes of this machine, workers of a Ray cluster, or right here.
 
 Called by `conduct`. Work comes in groups of jobs that share a scene; a group stays with one worker,
 which remembers what it drew. A worker that dies is replaced, its job is tried once more, and a
@@ -22,7 +22,7 @@ from forestall.errors import InputError, UnknownNameError
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
 
-ENGINES = ("local", "ray")
+ENGINES = ("inline", "local", "ray")
 
 
 class WorkerDiedError(Exception):
@@ -71,6 +71,29 @@ class LocalLane:
     @staticmethod
     def _started() -> ProcessPoolExecutor:
         return ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+
+
+class InlineLane:
+    """This very process: for a debugger, and for work that is done sooner than a process starts."""
+
+    def submit(self, function: Callable[[Any], Any], job: Any) -> Future[Any]:
+        """Do the job at once."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(job))
+        except Exception as error:  # noqa: BLE001 - handed on by the future, as of other lanes
+            future.set_exception(error)
+        return future
+
+    def renew(self) -> None:
+        """Nothing died."""
+
+    def close(self) -> None:
+        """Nothing is under way."""
+
+    def died(self, error: BaseException) -> bool:
+        """Never: the process would be gone."""
+        return False
 
 
 class RayLane:
@@ -131,6 +154,8 @@ def make_lanes(engine: str, workers: int, address: str | None = None) -> list[La
         InputError: Ray is not installed, or its cluster is not to be reached.
     """
     check_engine(engine)
+    if engine == "inline":
+        return [InlineLane()]
     if engine == "local":
         return [LocalLane() for _ in range(workers)]
     import ray

@@ -21,7 +21,7 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Choice
-from forestall.fingerprint import ROW_MAKING, sources_digest
+from forestall.fingerprint import ROW_MAKING, sources_digest, weights_of
 from forestall.records.record import replace_file
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
@@ -61,9 +61,11 @@ class About:
 
     @classmethod
     def now(cls, kind: str, what: Mapping[str, Any], memory: str | None = None) -> About:
-        """With the digest of the code at hand, and of the memory if one is given."""
+        """With the digest of the code at hand, of weights of others, and of the memory if given."""
         content = Path(memory).read_bytes() if memory else b""
-        digest = sources_digest([hashlib.blake2b(content).hexdigest()], but=ROW_MAKING)
+        parts = what.get("settings", {}).get("parts", {})
+        weights = weights_of(part["name"] for part in parts.values())
+        digest = sources_digest([hashlib.blake2b(content).hexdigest(), weights], but=ROW_MAKING)
         return cls(kind, json.loads(json.dumps(what)), digest)
 
     @property

@@ -22,15 +22,15 @@ from forestall.assembly.demonstrations import load_memory
 from forestall.assembly.make import make_world, prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.comparison.timing import score_times
+from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, ForestallError
 from forestall.experiments.conduct import Progress
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
 from forestall.kinds import PERCEIVER, REPLANNER, SEGMENTER
 from forestall.seams import OpenWorld, Replanner
-from forestall.tasks.files import load_task
+from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.episode import EpisodeRecord
-from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis
@@ -134,8 +134,11 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
         environment = world.environment
         times = _timed(1, lambda: environment.reset(seed))
         rows = [_row("scene built", "ms", times, None)]
-        focus = _centre(world, "Microwave-1")
-        environment.execute(Subtask("navigate_to_obj", ("Microwave",)))
+        domain, step = loaded.domain, _putting(loaded)
+        thing, place = (f"{a}-1" for a in step.args)
+        focus, drive = _centre(world, place), domain.driving()
+        assert drive is not None
+        environment.execute(Subtask(drive.name, (place,)))
         observations = []
         times = _timed(repeat, lambda: observations.append(environment.observe((focus,))))
         rows.append(_row("RGB-D-and-ids frame", "ms", times, 300))
@@ -149,7 +152,7 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
         times = _timed(repeat, lambda: perceiver.perceive(full))
         rows.append(_row(f"frame → graph ({masks} masks)", "ms", times, 60))
         graph = perceiver.perceive(observations[-1])
-        subtask = Subtask.parse("put_in(Plate-1, Microwave-1)")
+        subtask = Subtask(step.skill, (thing, place))
         context = BoundaryContext(
             loaded.task,
             loaded.task.plan,
@@ -160,12 +163,27 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
             perceiver.scope(graph, subtask),
             observations[-1],
         )
-        rows.append(_row("repair plan", "ms", _plans(context, parts.part(REPLANNER), repeat), 50))
+        rows.append(
+            _row("repair plan", "ms", _plans(context, parts.part(REPLANNER), domain, repeat), 50)
+        )
     return rows
 
 
-def _plans(context: BoundaryContext, replanner: Replanner, repeat: int) -> list[float]:
-    wanted = (Literal("open", ("Microwave-1",), "open"), Literal("held_by", ("Plate-1", "gripper")))
+def _putting(loaded: LoadedTask) -> Subtask:
+    """The last step of the task that puts what is in the hand somewhere."""
+    plan, skills = loaded.task.plan, loaded.domain.skills
+    return [s for s in plan if skills[s.skill].hand is not None and len(s.args) == 2][-1]
+
+
+def _plans(
+    context: BoundaryContext, replanner: Replanner, domain: Domain, repeat: int
+) -> list[float]:
+    """Plans for the facts that would help where the next subtask is refused from the start."""
+    bound = domain.bound(context.subtask)
+    needs = domain.skill(context.subtask.skill).needs
+    lacking = [x.bind(bound) for n in needs for x in n.lacking]
+    known = [x for x in lacking if not any(a.startswith("?") for a in x.args)]
+    wanted = tuple(x for x in known if x.predicate == domain.roles.holding or x.is_state)[:2]
     return _timed(repeat, lambda: replanner.replan(context, Diagnosis("a measurement", wanted)))
 
 

@@ -108,14 +108,7 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
     listeners = []
     folder = work.page_folder
     if folder is not None:
-        listeners.append(
-            RunRecorder(
-                folder,
-                scenario=work.run.case.scenario,
-                strategy=work.run.strategy,
-                page="index.html",
-            )
-        )
+        listeners.append(RunRecorder(folder, page="index.html"))
     record = run_episode(prepared, demonstrations, listeners, memory, trace, _world(prepared))
     if folder is not None:
         dull = not work.run.case.failing and record.success and not alarms(record)

@@ -1,1 +1,1 @@
-"""Skills as a planning domain: validate any plan, translate, search, export."""
+"""Skills as a planning domain: validate any plan, ground, search, export."""

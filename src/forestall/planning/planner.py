@@ -1,30 +1,44 @@
 """The planner: from an observed state and a goal to a readable plan.
 
-Called by `replanning/`; calls `relevance`, `translate`, `search`. Driving is not searched for:
-`navigate_to_obj` steps are put in afterwards where the next manipulation is at another place.
+Called by `replanning`; calls `relevance`, `ground`, `number`, `search`, `driving`. First on what
+matters for the goal, and where that has no plan on everything; only then is something unsolvable.
 """
 
 from __future__ import annotations
 
 import time
+from collections import OrderedDict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from forestall.planning.domain import Refusal, State, apply
-from forestall.planning.problem import Operator, Problem
-from forestall.planning.relevance import Conjunction, alternatives, universe
+from forestall.planning.driving import gathered, with_driving
+from forestall.planning.goals import (
+    Alternatives,
+    Conjunction,
+    alternatives,
+    negated,
+    shown,
+)
+from forestall.planning.ground import Grounding, ground
+from forestall.planning.grounder import Universe
+from forestall.planning.number import UnsupportedError, number
+from forestall.planning.problem import Problem
+from forestall.planning.relevance import everything, narrowed
 from forestall.planning.search import SearchConfig, SearchOutcome, solve
-from forestall.planning.translate import UnsupportedError, translate
-from forestall.types.facts import GRIPPER
+from forestall.planning.state import State
+from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 from forestall.types.task import Goal
 from forestall.types.verdict import ReplanOutcome
 
 OUTCOMES = {
     SearchOutcome.SOLVED: ReplanOutcome.SOLVED,
-    SearchOutcome.UNSOLVABLE: ReplanOutcome.UNSOLVABLE,
+    SearchOutcome.UNSOLVABLE: ReplanOutcome.NOT_FOUND,
+    SearchOutcome.CUT_SHORT: ReplanOutcome.NOT_FOUND,
     SearchOutcome.TIMEOUT: ReplanOutcome.TIMEOUT,
 }
+
+_RECENT = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +55,54 @@ class Planned:
 
 def plan_to(
     state: State,
-    goals: Sequence[Conjunction],
+    goals: Alternatives,
     config: SearchConfig | None = None,
     also: Iterable[str] = (),
+    widen: bool = True,
 ) -> Planned:
-    """Plan from a state to any one of some ground conjunctions."""
+    """Plan from a state to any one of some ground conjunctions.
+
+    Args:
+        state: the first state.
+        goals: what to reach.
+        config: bounds of the search.
+        also: further things to keep in the narrowed problem.
+        widen: go on with everything where the narrowed problem has no plan.
+    """
     start_s = time.perf_counter()
-    if not goals:
+    config = config or SearchConfig()
+    if not goals.conjunctions:
         return Planned(ReplanOutcome.UNSOLVABLE, note="nothing that is known can meet the goal")
-    kept = universe(state, goals, also)
+    kept = narrowed(state, goals.conjunctions, also)
+    planned = Planned(ReplanOutcome.NOT_FOUND)
+    for careful in (True, False):
+        tried = _attempt(state, goals, kept, config, careful)
+        planned = replace(tried, expanded=planned.expanded + tried.expanded)
+        if planned.outcome in (ReplanOutcome.SOLVED, ReplanOutcome.UNSUPPORTED):
+            break
+        if planned.outcome is ReplanOutcome.TIMEOUT:
+            break
+    failed = planned.outcome in (ReplanOutcome.NOT_FOUND, ReplanOutcome.REJECTED)
+    if failed and widen and planned.expanded < config.max_expansions:
+        planned = _on_everything(state, goals, config, planned)
+    return replace(planned, seconds=time.perf_counter() - start_s)
+
+
+def _on_everything(
+    state: State, goals: Alternatives, config: SearchConfig, before: Planned
+) -> Planned:
+    """The search that proves something, or finds what narrowing has hidden."""
+    limits = replace(config, time_limit_s=min(config.time_limit_s, config.whole_limit_s))
+    tried = _attempt(state, goals, everything(state), limits, careful=False)
+    return replace(tried, expanded=before.expanded + tried.expanded)
+
+
+def _attempt(
+    state: State, goals: Alternatives, kept: Universe, config: SearchConfig, careful: bool
+) -> Planned:
+    start_s = time.perf_counter()
     try:
-        problem = translate(state, goals, kept)
+        problem = number(_grounding(state, kept), state, goals.conjunctions, careful)
     except UnsupportedError as error:
         return Planned(ReplanOutcome.UNSUPPORTED, note=str(error))
     found = solve(problem, config)
@@ -59,14 +110,15 @@ def plan_to(
     subtasks: tuple[Subtask, ...] = ()
     final, note = None, ""
     if outcome is ReplanOutcome.SOLVED:
-        named = {a for goal in goals for x in goal for a in x.args}
-        loose = frozenset(x for x in kept.supports if x not in named)
-        steps = _gathered(problem, state, [problem.operators[i] for i in found.steps])
+        loose = frozenset(x for x in kept.supports if x not in goals.names)
+        steps = gathered(problem, state, [problem.operators[i] for i in found.steps])
         subtasks, final, note = with_driving(state, steps, loose)
         if final is None:
             outcome = ReplanOutcome.REJECTED
-    elif outcome is ReplanOutcome.UNSOLVABLE:
-        note = _why_not(state, goals)
+    elif found.outcome is SearchOutcome.UNSOLVABLE:
+        whole = kept.purposeful is None and goals.complete and not problem.bounded and not careful
+        outcome = ReplanOutcome.UNSOLVABLE if whole else ReplanOutcome.NOT_FOUND
+        note = _why_not(state, goals.conjunctions)
     else:
         note = f"no plan within the limits ({found.expanded} states expanded)"
     return Planned(outcome, subtasks, final, found.expanded, time.perf_counter() - start_s, note)
@@ -75,100 +127,56 @@ def plan_to(
 def plan_goal(state: State, goal: Goal, config: SearchConfig | None = None) -> Planned:
     """Plan from a state to a task's goal, whatever binding of its variables is nearest."""
     goals = alternatives(state, goal)
-    if not goals:
+    if not goals.conjunctions:
         missing = [c for _, c in goal.variables if not _anywhere(state, c)]
         missing += [a for x in goal.literals for a in x.args if _nowhere(state, a)]
         names = ", ".join(dict.fromkeys(missing)) or "what the goal asks for"
         return Planned(ReplanOutcome.UNSOLVABLE, note=f"{names}: its place is not known")
-    return plan_to(state, goals, config)
+    planned = plan_to(state, goals, config, widen=False)
+    if planned.outcome in (ReplanOutcome.NOT_FOUND, ReplanOutcome.REJECTED):
+        bounds = config or SearchConfig()
+        if planned.expanded < bounds.max_expansions:
+            goals = alternatives(state, goal, whole=True)
+            return _on_everything(state, goals, bounds, planned)
+    return planned
 
 
-def pose(state: State, goals: Sequence[Conjunction], also: Iterable[str] = ()) -> Problem:
+def pose(
+    state: State, goals: Alternatives, also: Iterable[str] = (), whole: bool = False
+) -> Problem:
     """The ground problem of a state and goal alternatives.
 
     Raises:
         UnsupportedError: no alternative can be expressed.
     """
-    return translate(state, goals, universe(state, goals, also))
+    kept = everything(state) if whole else narrowed(state, goals.conjunctions, also)
+    return number(_grounding(state, kept), state, goals.conjunctions, not whole)
 
 
-def _gathered(problem: Problem, state: State, steps: list[Operator]) -> list[Operator]:
-    """Turn things on and off where the robot is anyway, if that saves driving.
-
-    A step at a switch moves up behind the last step at its place, where the plan still works.
-    """
-    for i, step in enumerate(steps):
-        if not step.subtask.skill.startswith("toggle"):
-            continue
-        place = _place(state, step.subtask.args[0])
-        near = [j for j in range(i - 1) if _place(state, steps[j].subtask.args[-1]) == place]
-        if not near or _place(state, steps[i - 1].subtask.args[-1]) == place:
-            continue
-        moved = [*steps[: near[-1] + 1], step, *steps[near[-1] + 1 : i], *steps[i + 1 :]]
-        if _works(problem, moved):
-            steps = moved
-    return steps
+_groundings: OrderedDict[tuple[object, ...], Grounding] = OrderedDict()
 
 
-def _works(problem: Problem, steps: Sequence[Operator]) -> bool:
-    bits = problem.initial
-    for operator in steps:
-        if operator.condition & bits != operator.condition:
-            return False
-        bits = operator.apply(bits)
-    return problem.reached(bits)
-
-
-def _place(state: State, name: str) -> str | None:
-    """Where the robot stands to handle a thing; None for what does not exist yet."""
-    if name not in state.kinds:
-        return None
-    device = state.category(name).device
-    if device is not None and device.acts_on is not None and state.targets(name):
-        return state.targets(name)[0]
-    return state.root(name)
-
-
-def with_driving(
-    state: State, operators: Sequence[Operator], loose: frozenset[str] = frozenset()
-) -> tuple[tuple[Subtask, ...], State | None, str]:
-    """Insert navigation, executing along; the final state is None if a step does not run.
-
-    A support in `loose` is named by its category: any other of its kind with room would do.
-    """
-    plan: list[Subtask] = []
-    where: str | None = None
-    for operator in operators:
-        subtask, over = operator.subtask, operator.over
-        subject = over or subtask.args[-1]
-        place = _place(state, subject)
-        steps_here = [subtask]
-        if (place != where or over) and subject != state.held:
-            landmark = over or _landmark(state, subject)
-            steps_here.insert(0, Subtask("navigate_to_obj", (landmark,)))
-        where = place
-        if place == subject and place in loose and state.instances(state.kinds[place])[0] == place:
-            steps_here = [_renamed(s, place, state.kinds[place]) for s in steps_here]
-        for step in steps_here:
-            after = apply(state, step)
-            if isinstance(after, Refusal):
-                return tuple(plan), None, f"{step} does not run: {after.reason}"
-            state = after
-            plan.append(step)
-    return tuple(plan), state, ""
-
-
-def _renamed(subtask: Subtask, old: str, new: str) -> Subtask:
-    return Subtask(subtask.skill, tuple(new if a == old else a for a in subtask.args))
-
-
-def _landmark(state: State, name: str) -> str:
-    """What to drive to for a thing: the container that it is inside, else itself."""
-    for place in state.chain(name):
-        fixture = place.parent == state.root(name) or state.vocabulary.encloses(place.parent)
-        if fixture and place.relation == "inside":
-            return place.parent
-    return name
+def _grounding(state: State, kept: Universe) -> Grounding:
+    """What can happen among the kept things; the several searches of one replanning share it."""
+    known = frozenset(kept.things)
+    hands = state.domain.robot.hands
+    facts = frozenset(f for f in state.facts if all(a in known or a in hands for a in f[1:]))
+    key = (
+        id(state.domain),
+        tuple((x, state.kinds[x]) for x in kept.things),
+        tuple(sorted(state.kinds.items())),
+        facts,
+        state.lost,
+        tuple(sorted(kept.made.items())),
+        kept.purposeful,
+        kept.supports,
+    )
+    found = _groundings.get(key)
+    if found is None:
+        found = _groundings[key] = ground(state, kept)
+        if len(_groundings) > _RECENT:
+            _groundings.popitem(last=False)
+    return found
 
 
 def _anywhere(state: State, category: str) -> bool:
@@ -176,13 +184,19 @@ def _anywhere(state: State, category: str) -> bool:
 
 
 def _nowhere(state: State, name: str) -> bool:
-    return name != GRIPPER and not name.startswith("?") and not _anywhere(state, name)
+    hands = state.domain.robot.hands
+    return name not in hands and not name.startswith("?") and not _anywhere(state, name)
 
 
 def _why_not(state: State, goals: Sequence[Conjunction]) -> str:
-    """A reason for a proven dead end, naming what is lost if something is."""
-    lost = sorted({a for goal in goals for x in goal for a in x.args if a in state.lost})
+    """A reason for a dead end, naming what is lost if something is."""
+    names = Alternatives(tuple(goals)).names
+    lost = sorted(names & state.lost)
     if lost:
         return f"{', '.join(lost)}: its place is not known"
-    facts = [x for x in goals[0] if not x.predicate.startswith("not ") and not state.holds(x)]
-    return "no sequence of skills leads to " + ", ".join(map(str, facts or goals[0]))
+    facts: list[Literal | str] = [
+        x for x in goals[0] if isinstance(x, Literal) and negated(x) is None and not state.holds(x)
+    ]
+    return "no sequence of skills leads to " + ", ".join(
+        map(str, facts or [shown(x) for x in goals[0]])
+    )

@@ -1,22 +1,26 @@
-"""A ground planning problem: atoms as bits of an int, operators with conditional effects.
+"""A ground planning problem: facts as bits of an int, operators, processes and derived facts.
 
-Made by `translate`, read by `heuristic`, `search` and `pddl`; calls nothing.
+Made by `ground`, read by `heuristic`, `search` and `pddl`; calls nothing. A state is an int over
+the base facts; `close` adds the complements and the derived facts that conditions ask for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from forestall.types.plan import Subtask
 
 Atom = tuple[str, ...]
-"""A ground fact, e.g. ("at", "Mug-1", "inside", "Sink-1"); ("not", *atom) is its complement."""
+"""A ground fact, e.g. ("inside", "Mug-1", "Sink-1") or ("dirty", "Mug-1", "clean");
+("not", *atom) is its complement, ("aux", n) an auxiliary fact that rules derive."""
+
+ROUNDS = 50
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Where `condition` holds before the operator, `add` and `delete` happen (add wins)."""
+    """Where `condition` holds before, `add` and `delete` (base facts) happen; add wins."""
 
     condition: int
     add: int
@@ -25,42 +29,171 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """One ground skill: runs where `condition` holds; every effect is judged on the state before.
+    """One ground skill: runs where `condition` holds; effects are judged on the state before.
 
-    The first effect is the unconditional one. `over` is the vessel that an egg is cracked over,
-    which the subtask itself does not name.
+    `over` is what the robot must face for it, which the subtask itself does not name; `makes` are
+    the things that it makes.
     """
 
     subtask: Subtask
     condition: int
     effects: tuple[Effect, ...]
     over: str | None = None
-
-    def apply(self, state: int) -> int:
-        """The state after the operator, which must be applicable."""
-        add = delete = 0
-        for effect in self.effects:
-            if effect.condition & state == effect.condition:
-                add |= effect.add
-                delete |= effect.delete
-        return (state & ~delete) | add
+    makes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
-    """Atoms by bit, the first state, operators, and goals of which any one suffices."""
+class Happening:
+    """One ground instance of a process."""
 
-    atoms: tuple[Atom, ...]
-    initial: int
-    goals: tuple[int, ...]
-    operators: tuple[Operator, ...]
+    condition: int
+    effects: tuple[Effect, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A derived fact holds where its body does: all of it, or at least so many facts of it."""
+
+    head: int
+    body: int
+    least: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Stratum:
+    """Rules that are run to a fixpoint together, and then the complements of what they derive."""
+
+    rules: tuple[Rule, ...]
+    complements: tuple[tuple[int, int], ...] = ()
+
+
+class Problem:
+    """Facts by bit, the first state, operators, and goals of which any one suffices.
+
+    Args:
+        atoms: name of every bit: base facts, then as many complements, then derived facts.
+        initial: the first state, base facts only.
+        goals: masks over all bits.
+        operators: the skills.
+        processes: instances of each process, in the order of the domain.
+        strata: how derived facts are computed.
+        negated: base facts whose complement something asks for.
+        triggers: base facts on which processes depend.
+        bounded: whether something that may be needed was left out (things made again and again).
+    """
+
+    def __init__(
+        self,
+        atoms: tuple[Atom, ...],
+        initial: int,
+        goals: tuple[int, ...],
+        operators: tuple[Operator, ...],
+        processes: tuple[tuple[Happening, ...], ...] = (),
+        strata: tuple[Stratum, ...] = (),
+        negated: int = 0,
+        triggers: int = 0,
+        depends: int = 0,
+        base: int = 0,
+        bounded: bool = False,
+    ) -> None:
+        self.atoms, self.initial, self.goals = atoms, initial, goals
+        self.operators, self.processes, self.strata = operators, processes, strata
+        self.negated, self.triggers, self.base, self.bounded = negated, triggers, base, bounded
+        self._depends = depends
+        self._derived: dict[int, int] = {}
+
+    def close(self, state: int) -> int:
+        """The state with complements and derived facts."""
+        full = state | ((self.negated & ~state) << self.base)
+        if not self.strata:
+            return full
+        key = state & self._depends
+        derived = self._derived.get(key)
+        if derived is None:
+            before = full
+            for stratum in self.strata:
+                full = _derive(stratum, full)
+            derived = full ^ before
+            self._derived[key] = derived
+        return full | derived
+
+    def apply(self, state: int, operator: Operator) -> int:
+        """The state after an applicable operator and after what then happens by itself."""
+        after = _carried(state, self.close(state), operator.effects)
+        if (state ^ after) & self.triggers:
+            return self.settle(after)
+        return after
+
+    def settle(self, state: int) -> int:
+        """The state after everything that happens by itself."""
+        for _ in range(ROUNDS):
+            before = state
+            for instances in self.processes:
+                full = self.close(state)
+                ready = [i for i in instances if i.condition & full == i.condition]
+                for instance in ready:
+                    state = _carried(state, full, instance.effects)
+                    full = self.close(state)
+            if state == before:
+                break
+        return state
 
     def reached(self, state: int) -> bool:
         """Whether some goal holds."""
-        return any(goal & state == goal for goal in self.goals)
+        full = self.close(state)
+        return any(goal & full == goal for goal in self.goals)
+
+    def works(self, operators: Sequence[Operator]) -> bool:
+        """Whether operators run one after the other and reach a goal."""
+        state = self.initial
+        for operator in operators:
+            if operator.condition & ~self.close(state):
+                return False
+            state = self.apply(state, operator)
+        return self.reached(state)
+
+    def full_add(self, effect: Effect) -> int:
+        """What an effect makes true, complements included."""
+        gone = effect.delete & ~effect.add & self.negated
+        return effect.add | (gone << self.base)
 
     def names(self, mask: int) -> Iterator[Atom]:
         """The atoms of a mask in bit order."""
-        for bit, atom in enumerate(self.atoms):
-            if mask >> bit & 1:
-                yield atom
+        while mask:
+            bit = mask & -mask
+            yield self.atoms[bit.bit_length() - 1]
+            mask ^= bit
+
+
+def _carried(state: int, full: int, effects: tuple[Effect, ...]) -> int:
+    add = delete = 0
+    for effect in effects:
+        if effect.condition & full == effect.condition:
+            add |= effect.add
+            delete |= effect.delete
+    return (state & ~delete) | add
+
+
+def _derive(stratum: Stratum, full: int) -> int:
+    waiting = stratum.rules
+    progress = True
+    while progress and waiting:
+        progress, later = False, []
+        for rule in waiting:
+            if rule.head & full:
+                continue
+            met = (
+                (rule.body & full).bit_count() >= rule.least
+                if rule.least
+                else rule.body & full == rule.body
+            )
+            if met:
+                full |= rule.head
+                progress = True
+            else:
+                later.append(rule)
+        waiting = tuple(later)
+    for head, complement in stratum.complements:
+        if not head & full:
+            full |= complement
+    return full

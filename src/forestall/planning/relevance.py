@@ -1,297 +1,71 @@
-"""Which goals, and which things of a scene, a planning problem is about.
+"""Which things of a scene a planning problem is about.
 
-Called by `planner` before `translate`. A goal with variables and category names becomes a list of
-ground alternatives; everything that cannot help any of them is left out of the problem: kept are
-the things of the goal, what is held, containers and blockers of what is kept, devices and tools
-that bring about a wanted state, and one or two free supports.
+Called by `planner` before grounding. Goes backwards over the schemas: what can bring a wanted fact
+about, what that needs, and for every open parameter the most promising thing of each category.
+Where the narrowed problem has no plan the planner takes `everything`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import islice, product
+from dataclasses import dataclass
 
-from forestall.planning.domain import products
-from forestall.planning.effects import may_cook
-from forestall.planning.state import State, by_number
-from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
-from forestall.types.task import Goal
+from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
+from forestall.domain.formula import (
+    And,
+    Every,
+    Fewer,
+    Formula,
+    Not,
+    Or,
+    Some,
+    free,
+    normal,
+)
+from forestall.domain.model import Copy, Domain, Effect, PredicateKind, Process, Skill
+from forestall.planning.goals import Conjunction, Made, makeable
+from forestall.planning.ground import schemas_of, simple_needs
+from forestall.planning.grounder import Grounder, Universe
+from forestall.planning.nodes import Node
+from forestall.planning.state import State
+from forestall.types.facts import Literal
 
-SUPPORTS = ("CounterTop", "DiningTable")
-"""Where things are put out of the way, in this order; any other plain support comes after."""
+DEPTH = 9
+GROUPS = 4
+"""How many categories of things are tried for one open parameter."""
 
-MAX_ALTERNATIVES = 48
-
-Conjunction = tuple[Literal, ...]
+Names = dict[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Universe:
-    """What a problem is about.
+class _Way:
+    """A fact or a copy in an effect of a skill or a process."""
 
-    Args:
-        things: kept existing things.
-        made: source → things that slicing or cracking it makes (those that matter).
-        purposeful: movable things that may be put anywhere they fit; others are only put away.
-        supports: where things are put away.
-    """
-
-    things: tuple[str, ...]
-    made: dict[str, tuple[str, ...]]
-    purposeful: frozenset[str]
-    supports: tuple[str, ...]
+    schema: Skill | Process
+    effect: Effect
+    what: Literal | Copy
+    simple: Formula
 
 
-def alternatives(state: State, goal: Goal) -> tuple[Conjunction, ...]:
-    """Ground conjunctions of which any one meets the goal (`never` included as negations).
-
-    Things that slicing or cracking could make count as instances of their category.
-    """
-    literals = list(goal.literals) + [negated(x) for x in goal.never]
-    variables = list(goal.variables)
-    ground: list[Literal] = []
-    for literal in (y for x in literals for y in _for_all(state, x)):
-        args = []
-        for position, arg in enumerate(literal.args):
-            if arg == GRIPPER or arg.startswith("?") or is_instance(arg):
-                args.append(state.vocabulary.canonical(arg))
-            else:
-                variable = f"?{len(ground)}.{position}"
-                variables.append((variable, state.vocabulary.canonical(arg)))
-                args.append(variable)
-        ground.append(Literal(literal.predicate, tuple(args), literal.value))
-    return tuple(islice(_bound(state, variables, ground), MAX_ALTERNATIVES))
+def everything(state: State) -> Universe:
+    """All things, without a limit to where they are put."""
+    things = tuple(sorted(state.kinds, key=by_number))
+    made = makeable(state)
+    kinds = {state.domain.canonical(n.rpartition("-")[0]) for ns in made.values() for n in ns}
+    makers = {r[0] for s in state.domain.skills.values() for m in s.makes
+              for r in state.domain.statics.get(m.by, ())}  # fmt: skip
+    lasting = any(
+        m.source not in {v for e in s.effects for v in e.gone}
+        for s in state.domain.skills.values()
+        for m in s.makes
+    )
+    return Universe(things, made, bounded=lasting or bool(kinds & makers))
 
 
-def _for_all(state: State, literal: Literal) -> Iterator[Literal]:
-    """A negative literal about a category is one about each of its instances."""
-    if literal.value != "false" and not literal.predicate.startswith("not "):
-        yield literal
-        return
-    choices = [
-        (a,) if a == GRIPPER or a.startswith("?") or is_instance(a) else possible(state, canonical)
-        for a in literal.args
-        for canonical in (state.vocabulary.canonical(a),)
-    ]
-    for args in product(*choices):
-        yield Literal(literal.predicate, args, literal.value)
-
-
-def negated(literal: Literal) -> Literal:
-    """The opposite literal; for an attribute its value is kept and "not" is in the predicate."""
-    if literal.value in ("true", "false"):
-        value = "false" if literal.value == "true" else "true"
-        return Literal(literal.predicate, literal.args, value)
-    return Literal(f"not {literal.predicate}", literal.args, literal.value)
-
-
-def _ban_kept(state: State, literal: Literal) -> bool:
-    """Whether a literal forbids something that is not so now."""
-    if literal.predicate.startswith("not "):
-        banned = Literal(literal.predicate.removeprefix("not "), literal.args, literal.value)
-        return not state.holds(banned)
-    return literal.value == "false" and state.holds(literal)
-
-
-def possible(state: State, category: str) -> tuple[str, ...]:
-    """Instances of a category that exist and are located, and those that could be made."""
-    existing = tuple(x for x in state.instances(category) if x not in state.lost)
-    source = _source_of(state, category)
-    if source is None:
-        return existing
-    return existing + products(state, category, count_made(state, source))
-
-
-def count_made(state: State, source: str) -> int:
-    """How many things slicing or cracking a source makes."""
-    return state.category(source).slices if state.category(source).slices_into else 1
-
-
-def _bound(
-    state: State, variables: Sequence[tuple[str, str]], literals: Sequence[Literal]
-) -> Iterator[Conjunction]:
-    choices = []
-    for variable, category in variables:
-        about = [x for x in literals if variable in x.args]
-        options = possible(state, category)
-        made = {x for x in options if x not in state.kinds}
-        if made:
-            first = min(made, key=by_number)
-            same = [v for v, c in variables if c == category]
-            options = tuple(x for x in options if x not in made or len(same) > 1 or x == first)
-        choices.append(
-            sorted(
-                options,
-                key=lambda x, v=variable, a=about: (  # type: ignore[misc]
-                    -sum(state.holds(y.bind({v: x})) for y in a),
-                    by_number(x),
-                ),
-            )
-        )
-    named = [v for v, _ in variables if "." not in v]
-    for values in product(*choices):
-        binding = dict(zip([v for v, _ in variables], values, strict=True))
-        if len({binding[v] for v in named}) == len(named):
-            yield tuple(dict.fromkeys(x.bind(binding) for x in literals))
-
-
-def _source_of(state: State, category: str) -> str | None:
-    """The thing from which the first thing of a category would be made."""
-    sources = [
-        x
-        for x in sorted(state.kinds, key=by_number)
-        if category in (state.category(x).slices_into, state.category(x).cracks_into)
-        and x not in state.lost
-        and x not in state.spoiled
-    ]
-    best = [x for x in sources if x == state.held or state.closed_around(x) is None]
-    return next(iter(best or sources), None)
-
-
-@dataclass
-class _Closure:
-    """Collects what is needed, until nothing more is."""
-
-    state: State
-    kept: set[str] = field(default_factory=set)
-    made: dict[str, set[str]] = field(default_factory=dict)
-    purposeful: set[str] = field(default_factory=set)
-    vessels: set[str] = field(default_factory=set)
-
-    def keep(self, names: Iterable[str | None]) -> None:
-        for name in names:
-            if name is None or name in self.kept:
-                continue
-            if name not in self.state.kinds:
-                self._make(name)
-                continue
-            self.kept.add(name)
-            state, category = self.state, self.state.category(name)
-            self.keep(p.parent for p in state.chain(name))
-            self.keep(state.blockers(name))
-            shape = category.receptacle
-            if shape is not None and (not category.fixture or shape.capacity is not None):
-                self.keep(state.contents(name))
-            if category.device is not None:
-                self.keep(state.targets(name))
-                if category.device.needs_held:
-                    self.use(self._first(category.device.needs_held))
-
-    def use(self, names: Iterable[str]) -> None:
-        names = tuple(names)
-        self.keep(names)
-        self.purposeful.update(names)
-
-    def want(self, literal: Literal) -> None:
-        """Keep what can bring a literal about; a ban that is kept now asks for nothing."""
-        state = self.state
-        if literal.predicate == "spoiled" or _ban_kept(state, literal):
-            return
-        for arg in literal.args:
-            if arg != GRIPPER and not arg.startswith("?"):
-                self.use((arg,))
-        name = literal.args[0] if literal.args else ""
-        predicate, value = literal.predicate, literal.value
-        if predicate == "vacant":
-            self.keep(state.contents(name))
-        elif predicate == "dirty" and value == "clean":
-            self._devices(name, lambda d: d.cleans)
-        elif predicate == "filled":
-            self.keep(x for x in sorted(state.kinds, key=by_number) if state.category(x).drains)
-            if value != "empty":
-                self._liquid(name, value)
-        elif predicate == "temperature" and value == "hot":
-            self._devices(name, lambda d: d.heats)
-        elif predicate == "temperature" and value == "cold":
-            self._devices(name, lambda d: d.cools)
-        elif predicate == "cooked" and value == "cooked":
-            self._devices(name, lambda d: may_cook(d, category_of(name)))
-
-    def _make(self, name: str) -> None:
-        source = _source_of(self.state, category_of(name))
-        if source is None:
-            return
-        self.made.setdefault(source, set()).add(name)
-        self.purposeful.add(name)
-        if self.state.category(source).slices_into is not None:
-            self.keep((source,))
-            self.use(self._first("Knife"))
-        else:
-            self.use((source,))
-
-    def _first(self, category: str, count: int = 1) -> tuple[str, ...]:
-        """The most promising instances of a category: held, accessible, unblocked ones first."""
-        state = self.state
-        found = [x for x in state.instances(category) if x not in state.lost]
-        found.sort(
-            key=lambda x: (
-                x != state.held,
-                state.closed_around(x) is not None,
-                bool(state.blockers(x)),
-                state.value(x, "dirty") == "dirty",
-                by_number(x),
-            )
-        )
-        return tuple(found[:count])
-
-    def _devices(self, name: str, works: object) -> None:
-        """Keep devices of a kind that take a thing, or one of the vessels that it can be in."""
-        state, vocabulary = self.state, self.state.vocabulary
-        carriers = [name] + [
-            v for v in sorted(self.purposeful | self.kept) if self._carries(v, name)
-        ]
-        fitting: dict[str, list[str]] = {}
-        for device in sorted(state.kinds, key=by_number):
-            kind = state.category(device).device
-            if kind is None or not works(kind):  # type: ignore[operator]
-                continue
-            for target in state.targets(device):
-                if any(vocabulary.accepts(target, c) for c in carriers):
-                    fitting.setdefault(state.kinds[device], []).append(device)
-        for devices in fitting.values():
-            known = [d for d in devices if d in self.kept]
-            free = [d for d in devices if any(state.has_room(t) for t in state.targets(d))]
-            self.keep(known or (free or devices)[:1])
-        if not fitting:
-            self._vessel_for(name)
-
-    def _carries(self, vessel: str, thing: str) -> bool:
-        state = self.state
-        if vessel not in state.kinds or state.category(vessel).fixture:
-            return False
-        return state.vocabulary.accepts(vessel, thing)
-
-    def _vessel_for(self, name: str) -> None:
-        state = self.state
-        for category in sorted(set(state.kinds.values())):
-            found = self._first(category)
-            if found and found[0] not in self.vessels and self._carries(found[0], name):
-                self.vessels.add(found[0])
-                self.use(found)
-
-    def _liquid(self, name: str, liquid: str) -> None:
-        state = self.state
-        self._devices(name, lambda d: d.fills == liquid)
-        sources = [x for x in state.kinds if state.value(x, "filled") == liquid and x != name]
-        carriers = [
-            x
-            for c in sorted(set(state.kinds.values()))
-            for x in self._first(c)
-            if x != name and state.value(x, "filled") is not None and state.category(x).pickupable
-        ]
-        pickable = name in state.kinds and state.category(name).pickupable
-        extra = sources if pickable else sources + carriers
-        self.use(sorted((x for x in extra if x not in state.lost), key=by_number)[:3])
-        if not pickable:
-            for carrier in extra[:3]:
-                self._devices(carrier, lambda d: d.fills == liquid)
-
-
-def universe(
+def narrowed(
     state: State, goals: Sequence[Conjunction], also: Iterable[str] = (), supports: int = 2
 ) -> Universe:
-    """Choose the things that matter for any of the goals.
+    """The things that matter for any of the goals.
 
     Args:
         state: the first state.
@@ -300,37 +74,398 @@ def universe(
         supports: how many supports to keep for putting things away.
     """
     closure = _Closure(state)
-    closure.keep((state.held,))
+    closure.keep(h for _, h in state.in_hands())
     closure.keep(x for x in also if x in state.kinds)
-    for literal in dict.fromkeys(x for goal in goals for x in goal):
-        closure.want(literal)
-    for literal in dict.fromkeys(x for goal in goals for x in goal):
-        closure.want(literal)
-    blocked = {x.args[0] for goal in goals for x in goal if x.predicate == "unblocked"}
-    chosen = _supports(state, closure.kept, {state.root(x) for x in blocked})[:supports]
+    parts = tuple(dict.fromkeys(p for goal in goals for p in goal))
+    for _ in range(2):
+        closure.visited.clear()
+        for part in parts:
+            closure.want(part)
+    chosen = _supports(state, closure.kept, closure.cleared)[:supports]
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
-    made = {s: tuple(sorted(m, key=by_number)) for s, m in sorted(closure.made.items())}
-    return Universe(things, made, frozenset(closure.purposeful), tuple(chosen))
+    return Universe(things, closure.made, frozenset(closure.purposeful), tuple(chosen))
 
 
 def _supports(state: State, kept: set[str], avoid: set[str]) -> list[str]:
-    """Supports in order of preference: room first, not where something is to be unblocked."""
+    """Supports in order of preference: room first, not where something is to be cleared."""
+    domain = state.domain
+    roots = {state.root(x) for x in avoid}
+    order = domain.roles.rest
     found = []
     for name, category in state.kinds.items():
-        shape = state.vocabulary.categories[category].receptacle
-        fixture = state.vocabulary.categories[category].fixture
-        plain = fixture and shape is not None and shape.relation == "on_top_of"
-        if plain and shape is not None and shape.capacity is None and category != "Floor":
-            found.append(name)
-    order = {c: i for i, c in enumerate(SUPPORTS)}
-    return sorted(
-        found,
-        key=lambda x: (
-            x in state.crowded,
-            x in avoid,
-            order.get(state.kinds[x], len(order)),
-            x not in kept,
-            by_number(x),
-        ),
+        kinds = domain.kinds(category)
+        ranks = [i for i, tag in enumerate(order) if tag in kinds]
+        if ranks and not kinds & set(domain.roles.avoid):
+            key = (name in state.crowded, name in roots, ranks[0], name not in kept)
+            found.append((key, by_number(name), name))
+    return [name for _, _, name in sorted(found)]
+
+
+class _Possible(Grounder):
+    """All things, with every relation that some skill could bring about (a `schemas.World`)."""
+
+    def __init__(self, state: State, made: Made) -> None:
+        things = tuple(sorted((x for x in state.kinds if x not in state.lost), key=by_number))
+        super().__init__(state, Universe(things, made), schemas_of(state.domain))
+        self.ways = _ways(state.domain)
+        self.source_of = {
+            n: (source, skill, variable)
+            for (source, skill, variable), names in made.items()
+            for n in names
+        }
+        self._can: dict[tuple[str, ...], bool] = {}
+        self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
+
+    def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
+        """A relation that holds or could be brought about."""
+        atom = (predicate, *args)
+        found = self._can.get(atom)
+        if found is None:
+            self._can[atom] = False
+            found = atom in self.state.facts or any(
+                True for way in self.ways.get(predicate, ()) for _ in self.bindings(way, atom)
+            )
+            self._can[atom] = found
+        return self.number_of(atom) if found else False
+
+    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
+        """What stands at a position or could be brought there."""
+        key = (predicate, position, *args[:position], *args[position + 1 :])
+        found = self._options.get(key)
+        if found is None:
+            self._options[key] = ()
+            names = dict.fromkeys(self.state.related(predicate, position, args))
+            atom = (predicate, *(a if i != position else "?" for i, a in enumerate(args)))
+            for way in self.ways.get(predicate, ()):
+                assert isinstance(way.what, Literal)
+                open_name = way.what.args[position]
+                for bound in self.bindings(way, atom):
+                    name = bound.get(open_name)
+                    if name is not None:
+                        names[name] = None
+            found = self._options[key] = tuple(names)
+        return found
+
+    def bindings(self, way: _Way, atom: tuple[str, ...]) -> Iterator[Names]:
+        """Bindings of a schema's parameters by which a way leads to a fact."""
+        names: Names = {}
+        args = way.what.args if isinstance(way.what, Literal) else (way.what.target,)
+        for variable, name in zip(args, atom[1:], strict=False):
+            if name.startswith("?"):
+                continue
+            if not variable.startswith("?"):
+                if variable != name:
+                    return
+            elif names.setdefault(variable, name) != name:
+                return
+        yield from self.completed(way, names)
+
+    def completed(self, way: _Way, names: Names) -> Iterator[Names]:
+        """Bindings of what is still open."""
+        schema = way.schema
+        if isinstance(schema, Skill):
+            for make in schema.makes:
+                piece = names.get(make.variable)
+                if piece is not None:
+                    source = self.source_of.get(piece)
+                    if source is None or source[1:] != (schema.name, make.variable):
+                        return
+                    if names.setdefault(make.source, source[0]) != source[0]:
+                        return
+            names = dict(names)
+            for make in schema.makes:
+                mine = self.universe.made.get((names.get(make.source, ""), schema.name, make.variable))
+                if mine and make.variable not in names:
+                    names[make.variable] = mine[0]
+        for parameter in schema.parameters:
+            name = names.get(parameter.name)
+            if name is not None and name not in self.categories:
+                return
+            if name is not None and parameter.kind and not self.is_a(name, parameter.kind):
+                return
+        left = tuple(p for p in schema.parameters if p.name not in names)
+        join = self.schemas.join(left, way.simple, frozenset(names) & free(way.simple))
+        for bound, _ in join(self, names):
+            yield from self._chosen(way, bound)
+
+    def _chosen(self, way: _Way, names: Names) -> Iterator[Names]:
+        schema, several = way.schema, [names]
+        for choice in schema.choices if isinstance(schema, Skill) else ():
+            variable = choice.variable.name
+            if variable in names:
+                continue
+            more = []
+            for known in several:
+                found: dict[str, None] = {}
+                for formula in choice.among:
+                    needed = free(formula) | free(choice.such_that)
+                    if needed - {variable} <= known.keys():
+                        join = self.schemas.join((choice.variable,), formula, free(formula))
+                        found.update((b[variable], None) for b, _ in join(self, known))
+                        if found and not _asks_state(self.domain, formula):
+                            break
+                more += [{**known, variable: x} for x in found] or [known]
+            several = more
+        for known in several:
+            own = {v.name for v in way.effect.variables}
+            needed = free(way.effect.condition) - own
+            if needed <= known.keys():
+                condition = way.effect.condition
+                if own:
+                    open_now = tuple(v for v in way.effect.variables if v.name not in known)
+                    bound = frozenset(free(condition)) & frozenset(known)
+                    join = self.schemas.join(open_now, condition, bound)
+                    if any(True for _ in join(self, known)):
+                        yield known
+                elif self.schemas.formula(condition)(self, known) is not False:
+                    yield known
+
+
+class _Closure:
+    """Collects what is needed, until nothing more is."""
+
+    def __init__(self, state: State) -> None:
+        self.state, self.domain = state, state.domain
+        self.all_made = makeable(state)
+        self.world = _Possible(state, self.all_made)
+        self.kept: set[str] = set()
+        self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
+        self.purposeful: set[str] = set()
+        self.cleared: set[str] = set()
+        self.visited: set[tuple[object, ...]] = set()
+
+    def keep(self, names: Iterable[str]) -> None:
+        """Keep things, with what has them, what blocks them, and what fills a limited place."""
+        state, roles = self.state, self.domain.roles
+        for name in names:
+            if name in self.kept or name not in state.kinds:
+                continue
+            self.kept.add(name)
+            self.keep(p.parent for p in state.chain(name))
+            if roles.blocking is not None:
+                self.keep(state.related(roles.blocking, 0, ("?", name)))
+            category = state.kind(name)
+            if category.numbers or roles.movable in category.tags:
+                self.keep(state.contents(name))
+
+    def use(self, name: str) -> None:
+        """Keep a thing that may be put anywhere it fits."""
+        if name in self.state.kinds:
+            self.keep((name,))
+            self.purposeful.add(name)
+        elif name in self.world.source_of:
+            self._make(name)
+
+    def _make(self, name: str) -> None:
+        source, skill_name, variable = self.world.source_of[name]
+        key = (source, skill_name, variable)
+        self.purposeful.add(name)
+        known = self.made.get(key, ())
+        if name in known:
+            return
+        self.made[key] = tuple(sorted({*known, name}, key=by_number))
+        self.keep((source,))
+        skill = self.domain.skills[skill_name]
+        if skill.at == variable and any(skill.hand or c.only_if for c in skill.choices):
+            self.purposeful.add(source)
+        make = next(m for m in skill.makes if m.variable == variable)
+        for need in skill.needs:
+            self.need(need.formula, {make.source: source, variable: name}, 1)
+
+    # --- goals -----------------------------------------------------------------------------------
+
+    def want(self, part: Formula) -> None:
+        """Keep what can bring a part of a goal about; a denial that holds asks for nothing."""
+        literal = part.part if isinstance(part, Not) else part
+        assert isinstance(literal, Literal)
+        denied = isinstance(part, Not) or literal.value == "false"
+        if denied and evaluate(part, self.state, {}) == TRUE:
+            return
+        known = self.domain.predicates.get(literal.predicate)
+        if known is not None and known.kind is PredicateKind.HISTORY:
+            if denied:
+                return
+        for arg in literal.args:
+            self.use(arg)
+        if literal.predicate in (self.domain.roles.unblocked, self.domain.roles.vacant):
+            self.cleared.update(a for a in literal.args if literal.predicate == self.domain.roles.unblocked)
+        self.need(part, {}, 0, always=True)
+
+    # --- needs -----------------------------------------------------------------------------------
+
+    def need(self, formula: Formula, names: Names, depth: int, always: bool = False) -> None:
+        """Keep what can make a formula true."""
+        if depth > DEPTH or not free(formula) <= names.keys():
+            return
+        if not always and evaluate(formula, self.state, names) == TRUE:
+            return
+        self._need(normal(formula), names, depth)
+
+    def _need(self, formula: Formula, names: Names, depth: int) -> None:
+        if isinstance(formula, Literal):
+            self._achieve(formula.bind(names), depth)
+        elif isinstance(formula, And):
+            for part in formula.parts:
+                self.need(part, names, depth)
+        elif isinstance(formula, Or):
+            for part in formula.parts:
+                if self.world.schemas.formula(part)(self.world, names) is not False:
+                    self.need(part, names, depth)
+        elif isinstance(formula, Some):
+            join = self.world.schemas.join(formula.variables, formula.part, free(formula))
+            found = [b for b, _ in join(self.world, names)]
+            for bound in self._best(found, {v.name for v in formula.variables}):
+                self.need(formula.part, bound, depth + 1)
+        elif isinstance(formula, Every):
+            against = normal(formula.part, False)
+            for bound, truth in solutions(formula.variables, against, self.state, names):
+                if truth == TRUE:
+                    self.need(formula.part, bound, depth + 1)
+        elif isinstance(formula, Fewer):
+            denied = Not(formula.part)
+            for bound, truth in solutions((formula.variable,), formula.part, self.state, names):
+                if truth == TRUE:
+                    self._need(normal(denied), bound, depth + 1)
+        elif isinstance(formula.part, Literal):
+            literal = formula.part.bind(names)
+            for value in self.domain.values(literal.predicate):
+                if value != literal.value:
+                    self._achieve(Literal(literal.predicate, literal.args, value), depth)
+
+    def _best(self, found: Sequence[Names], new: set[str]) -> list[Names]:
+        """The most promising bindings, one for each combination of categories."""
+        groups: dict[tuple[str, ...], list[Names]] = {}
+        categories = self.world.categories
+        for bound in found:
+            key = tuple(categories.get(bound[v], "") for v in sorted(new) if v in bound)
+            groups.setdefault(key, []).append(bound)
+        best = [min(g, key=lambda b: [self._ease(b[v]) for v in sorted(new) if v in b])
+                for g in groups.values()]  # fmt: skip
+        best.sort(key=lambda b: [self._ease(b[v]) for v in sorted(new) if v in b])
+        for bound in best[:GROUPS]:
+            self.keep(bound[v] for v in new if v in bound)
+        return best[:GROUPS]
+
+    def _ease(self, name: str) -> tuple[object, ...]:
+        state, roles = self.state, self.domain.roles
+        if name not in state.kinds:
+            return (2, True, True, by_number(name))
+        held = any(h == name for _, h in state.in_hands())
+        category = state.kind(name)
+        shut_in = roles.accessible is not None and not state.says(roles.accessible, name)
+        blocked = roles.unblocked is not None and not state.says(roles.unblocked, name)
+        full = bool(category.numbers) and bool(state.contents(name))
+        avoided = bool(category.tags & set(roles.avoid))
+        fixed = roles.fixture in category.tags
+        rank = 0 if held or name in self.kept else 1
+        return (avoided, rank, not fixed, shut_in or blocked or full, by_number(name))
+
+    def _achieve(self, literal: Literal, depth: int) -> None:
+        key = (literal.predicate, *literal.args, literal.value)
+        if key in self.visited or depth > DEPTH:
+            return
+        self.visited.add(key)
+        known = self.domain.predicates.get(literal.predicate)
+        if known is None or known.kind is PredicateKind.STATIC:
+            return
+        if known.kind is PredicateKind.DERIVED:
+            assert known.definition is not None
+            names = {p.name: a for p, a in zip(known.parameters, literal.args, strict=True)}
+            definition = known.definition if literal.value != "false" else Not(known.definition)
+            self.need(definition, names, depth)
+            return
+        if literal.value == "false":
+            self._end(literal, depth)
+            return
+        atom = (literal.predicate, *literal.args)
+        for way in self.world.ways.get(literal.predicate, ()):
+            if isinstance(way.what, Literal) and known.kind is PredicateKind.ATTRIBUTE:
+                if way.what.value != literal.value:
+                    continue
+            self._follow(way, atom, literal, depth)
+
+    def _follow(self, way: _Way, atom: tuple[str, ...], literal: Literal, depth: int) -> None:
+        bound = set(way.what.args) if isinstance(way.what, Literal) else {way.what.target}
+        found = list(self.world.bindings(way, atom))
+        if isinstance(way.what, Copy):
+            copy = way.what
+            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
+            movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
+            found = having if having or movable else found
+        new = {p.name for p in way.schema.parameters if p.name not in bound}
+        conditions = [way.effect.condition] if not way.effect.variables else []
+        if isinstance(way.schema, Process):
+            conditions.append(way.schema.condition)
+        else:
+            conditions += [n.formula for n in way.schema.needs]
+            new |= {c.variable.name for c in way.schema.choices}
+        for binding in self._best(found, new):
+            hand = way.schema.hand if isinstance(way.schema, Skill) else None
+            for variable in new & binding.keys():
+                if variable == hand or isinstance(way.schema, Process):
+                    self.use(binding[variable])
+            for condition in conditions:
+                self.need(condition, binding, depth + 1)
+            if isinstance(way.what, Copy):
+                wanted = Literal(way.what.attribute, (binding[way.what.source],), literal.value)
+                self.need(wanted, {}, depth + 1)
+
+    def _end(self, literal: Literal, depth: int) -> None:
+        """A relation is to end: what is there is taken away, or the skill that says so is used."""
+        roles = self.domain.roles
+        self.keep(literal.args)
+        predicates = self.domain.predicates
+        group = predicates[literal.predicate].group
+        holding = roles.holding
+        if holding is not None and literal.args:
+            name = literal.args[0]
+            related = group is not None and predicates[holding].group == group
+            if (related and literal.predicate != holding) or literal.predicate == roles.blocking:
+                if self.domain.is_a(self.world.categories.get(name, ""), roles.movable):
+                    for hand in self.domain.robot.hands[:1]:
+                        self._achieve(Literal(holding, (name, hand)), depth + 1)
+                return
+        for way in self.world.ways.get(f"not {literal.predicate}", ()):
+            self._follow(way, (literal.predicate, *literal.args), literal, depth)
+
+
+def _ways(domain: Domain) -> dict[str, list[_Way]]:
+    """Predicate (with "not " for what ends it) → effects that are about it."""
+    found = domain.__dict__.get("_ways")
+    if found is not None:
+        return found  # type: ignore[no-any-return]
+    ways: dict[str, list[_Way]] = {}
+    able = domain.robot.skills or tuple(domain.skills)
+    seen: set[tuple[object, ...]] = set()
+    schemas: list[Skill | Process] = [domain.skills[s] for s in able]
+    for schema in [*schemas, *domain.processes]:
+        simple: Formula
+        if isinstance(schema, Skill):
+            simple = simple_needs(domain, schema)
+        else:
+            simple = schema.condition
+        if isinstance(schema, Skill) and schema.family:
+            like = (schema.family, schema.parameters, schema.needs, schema.effects)
+            if like in seen:
+                continue
+            seen.add(like)
+        for effect in schema.effects:
+            for fact in effect.facts:
+                name = f"not {fact.predicate}" if fact.value == "false" else fact.predicate
+                ways.setdefault(name, []).append(_Way(schema, effect, fact, simple))
+            for copy in effect.copies:
+                ways.setdefault(copy.attribute, []).append(_Way(schema, effect, copy, simple))
+    domain.__dict__["_ways"] = ways
+    return ways
+
+
+def _asks_state(domain: Domain, formula: Formula) -> bool:
+    from forestall.domain.formula import literals
+
+    static = {p.name for p in domain.predicates.values() if p.kind is PredicateKind.STATIC}
+    return any(
+        x.predicate not in static and x.predicate in (*domain.predicates, "facing")
+        for x, _ in literals(formula)
     )
+

@@ -27,10 +27,12 @@ class SearchConfig:
     Args:
         time_limit_s: wall-clock limit.
         max_expansions: limit on expanded states.
+        whole_limit_s: time for a problem with everything in it, where the narrowed one failed.
     """
 
     time_limit_s: float = 5.0
     max_expansions: int = 200_000
+    whole_limit_s: float = 1.0
 
 
 class SearchOutcome(Enum):
@@ -38,7 +40,8 @@ class SearchOutcome(Enum):
 
     SOLVED = "solved"
     UNSOLVABLE = "unsolvable"  # proven: every reachable state was seen, or none can lead there
-    TIMEOUT = "timeout"  # a limit was hit; nothing is proven
+    CUT_SHORT = "cut short"  # so many states were expanded; nothing is proven
+    TIMEOUT = "timeout"  # the time is over; nothing is proven
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,26 +78,29 @@ def _search(
     entry = (problem.initial, -1, -1, 0)
     while True:
         before, via, _, depth = entry
-        state = before if via < 0 else operators[via].apply(before)
+        state = before if via < 0 else problem.apply(before, operators[via])
         if state not in seen:
             seen.add(state)
             parents[state] = (before, via, depth)
-            if problem.reached(state):
+            full = problem.close(state)
+            if any(g & full == g for g in problem.goals):
                 return SearchOutcome.SOLVED, _path(parents, state), expanded
-            h, helpful = heuristic.evaluate(state)
+            h, helpful = heuristic.evaluate(full)
             if h is not None:
                 expanded += 1
                 if best is None or h < best:
                     best, credit = h, credit + BOOST * 50
                 liked = set(helpful)
                 for index, operator in enumerate(operators):
-                    if operator.condition & state == operator.condition:
+                    if operator.condition & full == operator.condition:
                         order += 1
                         item = (h, depth, order, state, index)
                         heapq.heappush(everyone, item)
                         if index in liked:
                             heapq.heappush(helpful_only, item)
-        if expanded >= config.max_expansions or time.perf_counter() > deadline_s:
+        if expanded >= config.max_expansions:
+            return SearchOutcome.CUT_SHORT, [], expanded
+        if time.perf_counter() > deadline_s:
             return SearchOutcome.TIMEOUT, [], expanded
         if helpful_only and (credit > 0 or not everyone or order % (BOOST + 1)):
             credit -= 1
@@ -124,10 +130,10 @@ def _shortened(problem: Problem, steps: list[int]) -> list[int]:
         kept = []
         for i, index in enumerate(steps):
             operator = problem.operators[index]
-            if i == position or operator.condition & state != operator.condition:
+            if i == position or operator.condition & ~problem.close(state):
                 continue
             kept.append(index)
-            state = operator.apply(state)
+            state = problem.apply(state, operator)
         if problem.reached(state):
             steps = kept
         else:

@@ -1,277 +1,359 @@
 """The symbolic state: what planning believes about the things of one scene graph.
 
-Built from a `SceneGraph` and read by domain, validator, translation and replanner; calls only the
-vocabulary and the types.
+Built from a `SceneGraph` and a `Domain`; read by `execute`, the validator, the planner and the
+replanner. It answers every formula of the domain with yes or no.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import product
 
-from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
+from forestall.domain.evaluate import TRUE, by_number, evaluate, literal_truth, number_of
+from forestall.domain.formula import Formula
+from forestall.domain.model import FACING, LOCATED, Category, Domain, PredicateKind
+from forestall.types.facts import Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
-from forestall.vocabulary import Category, Device, Vocabulary
 
-SUPPORTED = (
-    "accessible",
-    "blocking",
-    "hand_empty",
-    "held_by",
-    "inside",
-    "located",
-    "on_top_of",
-    "spoiled",
-    "unblocked",
-    "vacant",
-)
-"""Predicates that a symbolic state decides besides attributes; the others are geometry."""
+__all__ = ["Place", "State", "by_number", "number_of"]
 
 CROWDED = 0.6
 """Share of a support's footprint from which on another one is preferred."""
 
-
-def number_of(name: str) -> int:
-    """The instance number of a name, 1 where it carries none."""
-    return int(name.rpartition("-")[2]) if is_instance(name) else 1
-
-
-def by_number(name: str) -> tuple[str, int]:
-    """Sort key: category first, then number ("Mug-2" before "Mug-10")."""
-    return category_of(name), number_of(name)
+Fact = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a thing is: `relation` ("inside" or "on_top_of") and the thing that has it."""
+    """Where a thing is: a containing relation and the thing that has it."""
 
     relation: str
     parent: str
 
 
-@dataclass(slots=True)
 class State:
-    """What holds at one moment; `domain.apply` copies it and never changes the one it was given.
+    """What holds at one moment (implements `evaluate.View`, with two values only).
+
+    `execute.apply` copies it and never changes the one it was given.
 
     Args:
+        domain: what its names mean.
         kinds: thing → category; whatever is not here does not exist.
         values: (thing, attribute) → value.
-        places: thing → where it is; no entry for what is held, fixed, lost or on nothing known.
-        held: what the gripper holds.
+        facts: relations and histories that hold, (predicate, *arguments).
         at: the last thing that was driven to or handled.
         lost: things whose place is not known.
-        blocking: (front, behind) pairs.
-        spoiled: things to which something irreversible has happened.
         hidden: containers whose inside was not observed and is assumed empty.
         crowded: supports with little free area, as far as the boxes of the graph tell.
-        assumed: facts that were not observed and are taken from the vocabulary.
+        assumed: facts that were not observed and are taken from the domain.
     """
 
-    vocabulary: Vocabulary
-    kinds: dict[str, str]
-    values: dict[tuple[str, str], str] = field(default_factory=dict)
-    places: dict[str, Place] = field(default_factory=dict)
-    held: str | None = None
-    at: str | None = None
-    lost: frozenset[str] = frozenset()
-    blocking: frozenset[tuple[str, str]] = frozenset()
-    spoiled: frozenset[str] = frozenset()
-    hidden: frozenset[str] = frozenset()
-    crowded: frozenset[str] = frozenset()
-    assumed: frozenset[Literal] = frozenset()
+    __slots__ = (
+        "_index", "_kind_index", "assumed", "at", "crowded", "domain", "facts", "hidden", "kinds",
+        "lost", "values",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        domain: Domain,
+        kinds: dict[str, str],
+        values: dict[tuple[str, str], str] | None = None,
+        facts: Iterable[Fact] = (),
+        at: str | None = None,
+        lost: frozenset[str] = frozenset(),
+        hidden: frozenset[str] = frozenset(),
+        crowded: frozenset[str] = frozenset(),
+        assumed: frozenset[Literal] = frozenset(),
+    ) -> None:
+        self.domain, self.kinds = domain, kinds
+        self.values = {} if values is None else values
+        self.facts: set[Fact] = set()
+        self._index: dict[tuple[str, int, str], set[Fact]] = {}
+        self._kind_index: dict[str, tuple[str, ...]] = {}
+        for fact in facts:
+            self.add(fact)
+        self.at, self.lost, self.hidden = at, lost, hidden
+        self.crowded, self.assumed = crowded, assumed
 
     @classmethod
-    def from_graph(cls, graph: SceneGraph, vocabulary: Vocabulary) -> State:
-        """Read a scene graph; nodes of categories that the vocabulary lacks are left out.
+    def from_graph(cls, graph: SceneGraph, domain: Domain) -> State:
+        """Read a scene graph; nodes of categories that the domain lacks are left out.
 
         An unobserved attribute takes its default and is listed in `assumed`, as is the emptiness
-        of every hidden container. A thing with neither box nor support is lost.
+        of every hidden container. A thing with neither box nor place is lost.
         """
-        state = cls(vocabulary, {}, held=graph.holding)
+        state = cls(domain, {})
+        roles, hands = domain.roles, domain.robot.hands
         lost, assumed = set(), set()
+        held = {r.subject for r in graph.relations if r.predicate == roles.holding}
+        placed = held | {r.subject for r in graph.relations if r.predicate in domain.containing}
         for node in graph.nodes:
-            category = vocabulary.categories.get(node.category)
-            if node.id == GRIPPER or category is None:
+            category = domain.categories.get(node.category)
+            if node.id in hands or category is None:
                 continue
             state.kinds[node.id] = node.category
-            for attribute, default in vocabulary.default_states(node.category).items():
+            for attribute, default in domain.default_states(node.category).items():
                 value = node.state(attribute)
                 if value is None:
                     assumed.add(Literal(attribute, (node.id,), default))
                 state.values[node.id, attribute] = default if value is None else value
-            placed = node.box_m is not None or graph.parents(node.id) or node.id == graph.holding
-            if not category.fixture and not placed:
+            loose = node.box_m is None and node.id not in placed
+            if loose and roles.fixture not in category.tags:
                 lost.add(node.id)
-        if state.held not in state.kinds:
-            state.held = None
-        state.places.update(_places(graph, state))
-        assumed |= {Literal("vacant", (h,)) for h in graph.hidden if h in state.kinds}
+        for r in graph.relations:
+            if r.subject not in state.kinds or r.predicate in domain.containing:
+                continue
+            if r.predicate in domain.moved and (r.object in state.kinds or r.object in hands):
+                state.add((r.predicate, r.subject, r.object))
+        for name, place in _places(graph, state).items():
+            state.add((place.relation, name, place.parent))
         state.lost = frozenset(lost)
-        state.blocking = frozenset(
-            (r.subject, r.object)
-            for r in graph.relations
-            if r.predicate == "blocking" and r.subject in state.kinds and r.object in state.kinds
-        )
         state.hidden = frozenset(h for h in graph.hidden if h in state.kinds)
+        if roles.vacant is not None:
+            assumed |= {Literal(roles.vacant, (h,)) for h in state.hidden}
         state.assumed = frozenset(assumed)
-        state.crowded = _crowded(graph)
+        state.crowded = _crowded(graph, domain)
         return state
 
     def copy(self) -> State:
         """An independent copy."""
-        return State(
-            self.vocabulary,
-            dict(self.kinds),
-            dict(self.values),
-            dict(self.places),
-            self.held,
-            self.at,
-            self.lost,
-            self.blocking,
-            self.spoiled,
-            self.hidden,
-            self.crowded,
-            self.assumed,
-        )
+        other = State.__new__(State)
+        other.domain, other.kinds, other.values = self.domain, dict(self.kinds), dict(self.values)
+        other.facts = set(self.facts)
+        other._index = {k: set(v) for k, v in self._index.items()}
+        other._kind_index = self._kind_index
+        other.at, other.lost, other.hidden = self.at, self.lost, self.hidden
+        other.crowded, other.assumed = self.crowded, self.assumed
+        return other
 
-    def category(self, name: str) -> Category:
-        """The category of an existing thing."""
-        return self.vocabulary.categories[self.kinds[name]]
+    # --- changes ---------------------------------------------------------------------------------
+
+    def add(self, fact: Fact) -> None:
+        """Let a fact hold; others of its group end for the same first argument."""
+        if fact in self.facts:
+            return
+        group = self.domain.predicates[fact[0]].group
+        if group is not None:
+            for name, other in self.domain.relations.items():
+                if other.group == group:
+                    for old in tuple(self._index.get((name, 0, fact[1]), ())):
+                        self.remove(old)
+        self.facts.add(fact)
+        for position, arg in enumerate(fact[1:]):
+            self._index.setdefault((fact[0], position, arg), set()).add(fact)
+
+    def remove(self, fact: Fact) -> None:
+        """Let a fact end."""
+        if fact not in self.facts:
+            return
+        self.facts.discard(fact)
+        for position, arg in enumerate(fact[1:]):
+            key = (fact[0], position, arg)
+            self._index[key].discard(fact)
+            if not self._index[key]:
+                del self._index[key]
+
+    def set_value(self, name: str, attribute: str, value: str) -> None:
+        """Change an attribute of a thing that has it; what was assumed about it is settled."""
+        old = self.values.get((name, attribute))
+        if old is None:
+            return
+        self.values[name, attribute] = value
+        if self.assumed:
+            self.assumed -= {Literal(attribute, (name,), old)}
+
+    def create(self, name: str, category: str) -> None:
+        """A new thing with the defaults of its category."""
+        self.kinds[name] = category
+        self._kind_index = {}
+        for attribute, value in self.domain.default_states(category).items():
+            self.values[name, attribute] = value
+
+    def take_away(self, name: str) -> None:
+        """A thing is no more; histories of it stay."""
+        del self.kinds[name]
+        self._kind_index = {}
+        for key in [k for k in self.values if k[0] == name]:
+            del self.values[key]
+        histories = self.domain.histories
+        for fact in [f for f in self.facts if name in f[1:] and f[0] not in histories]:
+            self.remove(fact)
+
+    # --- what evaluate asks ----------------------------------------------------------------------
+
+    def things(self) -> Iterable[str]:
+        """Everything that exists."""
+        return self.kinds
+
+    def category(self, name: str) -> str:
+        """The category name of a thing, that of its name for what does not exist."""
+        return self.kinds.get(name) or self.domain.canonical(category_of(name))
+
+    def of_kind(self, kind: str) -> Iterable[str]:
+        """Things that count as a tag, a category or an attribute holder."""
+        found = self._kind_index.get(kind)
+        if found is None:
+            kinds = self.domain.kinds
+            found = tuple(n for n, c in self.kinds.items() if kind in kinds(c))
+            self._kind_index[kind] = found
+        return found
+
+    def fact(self, predicate: str, args: tuple[str, ...]) -> int:
+        """Whether a relation, a history or a built-in fact holds."""
+        if predicate == LOCATED:
+            return TRUE if args[0] not in self.lost and args[0] in self.kinds else 0
+        if predicate == FACING:
+            return TRUE if self.at == args[0] else 0
+        return TRUE if (predicate, *args) in self.facts else 0
 
     def value(self, name: str, attribute: str) -> str | None:
         """The value of an attribute, None where the thing does not have it."""
         return self.values.get((name, attribute))
 
+    def unsure(self, name: str, attribute: str) -> bool:
+        """Nothing is unsure here."""
+        return False
+
+    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Iterable[str]:
+        """What stands at a position of a relation, the rest being given."""
+        if len(args) == 1:
+            return [f[1] for f in self.facts if f[0] == predicate]
+        given = next((i for i, a in enumerate(args) if i != position and a[0] != "?"), None)
+        if given is None:  # p(?x, ?x)
+            return sorted({f[1] for f in self.facts if f[0] == predicate and len({*f[1:]}) == 1})
+        found = self._index.get((predicate, given, args[given]), ())
+        return sorted(
+            {
+                f[position + 1]
+                for f in found
+                if all(i == position or a.startswith("?") or f[i + 1] == a
+                       for i, a in enumerate(args))
+            }
+        )  # fmt: skip
+
+    def with_value(self, attribute: str, value: str) -> Iterable[str]:
+        """Things whose attribute has a value."""
+        values = self.values
+        return [n for n in self.of_kind(f"has_{attribute}") if values[n, attribute] == value]
+
+    # --- questions -------------------------------------------------------------------------------
+
+    def kind(self, name: str) -> Category:
+        """The category of an existing thing."""
+        return self.domain.categories[self.kinds[name]]
+
+    def true(self, formula: Formula, names: dict[str, str] | None = None) -> bool:
+        """Whether a formula holds under a binding of its variables."""
+        return evaluate(formula, self, names or {}) == TRUE
+
+    def says(self, predicate: str | None, *args: str) -> bool:
+        """Whether a fact holds, derived ones too; False for a role that the domain lacks."""
+        return predicate is not None and literal_truth(Literal(predicate, args), self, {}) == TRUE
+
+    @property
+    def held(self) -> str | None:
+        """What the first hand that holds something holds."""
+        return next((h for _, h in self.in_hands()), None)
+
+    def in_hands(self) -> Iterator[tuple[str, str]]:
+        """(hand, thing) for every hand that holds something."""
+        holding = self.domain.roles.holding
+        for hand in self.domain.robot.hands if holding else ():
+            for fact in sorted(self._index.get((holding or "", 1, hand), ())):
+                yield hand, fact[1]
+
     def instances(self, category: str) -> tuple[str, ...]:
         """Existing things of a category, lowest number first."""
-        return tuple(sorted((n for n, k in self.kinds.items() if k == category), key=by_number))
+        if category not in self.domain.categories:
+            return ()
+        found = [n for n in self.of_kind(category) if self.kinds[n] == category]
+        return tuple(sorted(found, key=by_number))
 
-    def contents(self, name: str, relation: str | None = None) -> tuple[str, ...]:
-        """What is directly in or on a thing."""
-        return tuple(
-            sorted(
-                (
-                    x
-                    for x, p in self.places.items()
-                    if p.parent == name and relation in (None, p.relation)
-                ),
-                key=by_number,
-            )
-        )
+    def contents(self, name: str) -> tuple[str, ...]:
+        """What is directly in, on or at a thing."""
+        found = {f[1] for r in self.domain.containing for f in self._index.get((r, 1, name), ())}
+        return tuple(sorted(found, key=by_number))
+
+    def place(self, name: str) -> Place | None:
+        """Where a thing is."""
+        for relation in self.domain.containing:
+            for fact in self._index.get((relation, 0, name), ()):
+                return Place(relation, fact[2])
+        return None
 
     def chain(self, name: str) -> Iterator[Place]:
         """Where a thing is, where that is, and so on upwards."""
-        place = self.places.get(name)
-        while place is not None:
+        seen = {name}
+        place = self.place(name)
+        while place is not None and place.parent not in seen:
             yield place
-            place = self.places.get(place.parent)
+            seen.add(place.parent)
+            place = self.place(place.parent)
 
     def root(self, name: str) -> str:
         """The outermost thing that has `name`, itself included."""
         return next((p.parent for p in reversed(list(self.chain(name)))), name)
 
-    def closed_around(self, name: str) -> str | None:
-        """The closed container that keeps the hand from a thing, if any."""
-        for place in self.chain(name):
-            closed = self.value(place.parent, "open") == "closed"
-            if closed and place.relation == "inside" and self.vocabulary.encloses(place.parent):
-                return place.parent
-        return None
-
-    def blockers(self, name: str) -> tuple[str, ...]:
-        """What stands in front of a thing."""
-        return tuple(sorted((y for y, x in self.blocking if x == name), key=by_number))
-
-    def has_room(self, receptacle: str) -> bool:
-        """Whether the capacity of a receptacle leaves room for one more thing."""
-        shape = self.category(receptacle).receptacle
-        if shape is None:
-            return False
-        used = len(self.contents(receptacle, shape.relation))
-        return shape.capacity is None or used < shape.capacity
-
-    def targets(self, name: str) -> tuple[str, ...]:
-        """The receptacles whose contents a device works on."""
-        device = self.category(name).device
-        if device is None:
-            return ()
-        if device.acts_on is None:
-            return (name,)
-        partners = self.instances(device.acts_on)
-        own = tuple(x for x in partners if number_of(x) == number_of(name))
-        return own or partners[:1]
-
-    def working(self, name: str) -> Device | None:
-        """The device of a thing, if it works now."""
-        device = self.category(name).device
-        if device is None:
-            return None
-        if device.always:
-            return device if self.value(name, "open") != "open" else None
-        return device if self.value(name, "toggled") == "on" else None
-
     def matches(self, name: str) -> tuple[str, ...]:
         """Existing things that an instance or category name can mean."""
-        canonical = self.vocabulary.canonical(name)
+        if name in self.kinds:
+            return (name,)
+        canonical = self.domain.canonical(name)
         return (canonical,) if canonical in self.kinds else self.instances(canonical)
 
     def holds(self, literal: Literal) -> bool:
         """Whether a literal holds; a category name means "some instance of it".
 
-        With the value "false" no instance may make it true. Predicates of geometry never hold.
+        With the value "false" no instance may make it true. What no skill is about never holds.
         """
+        if not decided(self.domain, literal):
+            return False
+        hands = self.domain.robot.hands
         choices = [
-            (a,) if a == GRIPPER else (self.matches(a) or ((a,) if is_instance(a) else ()))
+            (a,) if a in hands else (self.matches(a) or ((a,) if is_instance(a) else ()))
             for a in literal.args
         ]
-        found = any(self._holds(literal.predicate, c, literal.value) for c in product(*choices))
+        positive = Literal(literal.predicate, literal.args, "true")
+        wanted = positive if literal.value == "false" else literal
+        found = any(
+            literal_truth(Literal(wanted.predicate, c, wanted.value), self, {}) == TRUE
+            for c in product(*choices)
+        )
         return not found if literal.value == "false" else found
 
-    def _holds(self, predicate: str, args: tuple[str, ...], value: str) -> bool:
-        if predicate == "hand_empty":
-            return self.held is None
-        if not args:
-            return False
-        name = args[0]
-        if predicate in ("inside", "on_top_of"):
-            return self.places.get(name) == Place(predicate, args[-1])
-        if predicate in self.vocabulary.attributes:
-            return self.value(name, predicate) == value
-        if name not in self.kinds:
-            return False
-        simple = {
-            "held_by": self.held == name,
-            "blocking": args in self.blocking,
-            "located": name not in self.lost,
-            "vacant": not self.contents(name),
-            "unblocked": not self.blockers(name),
-            "accessible": self.closed_around(name) is None,
-            "spoiled": name in self.spoiled,
-        }
-        return simple.get(predicate, False)
+
+def decided(domain: Domain, literal: Literal) -> bool:
+    """Whether a state decides a literal; relations that no skill is about are geometry."""
+    known = domain.predicates.get(literal.predicate)
+    if known is None:
+        return literal.predicate == LOCATED or domain.known_kind(literal.predicate)
+    return known.kind is not PredicateKind.RELATION or literal.predicate in domain.moved
 
 
-def _crowded(graph: SceneGraph) -> frozenset[str]:
-    """Things whose contents cover more than `CROWDED` of their own footprint."""
+def _crowded(graph: SceneGraph, domain: Domain) -> frozenset[str]:
+    """Supports whose contents cover more than `CROWDED` of their own footprint."""
     covered: dict[str, float] = {}
     area_m2 = {n.id: n.box_m.size[0] * n.box_m.size[1] for n in graph.nodes if n.box_m is not None}
     for r in graph.relations:
-        if r.predicate == "on_top_of":
+        if r.predicate in domain.containing and domain.is_a(r.object, domain.roles.support):
             covered[r.object] = covered.get(r.object, 0.0) + area_m2.get(r.subject, 0.0)
     return frozenset(x for x, a in covered.items() if x in area_m2 and a > CROWDED * area_m2[x])
 
 
 def _places(graph: SceneGraph, state: State) -> dict[str, Place]:
-    """One place for each thing: inside before on top, the innermost of several, no cycles."""
+    """One place for each thing: the innermost of several, the ground last, no cycles."""
+    domain = state.domain
+    held = {h for _, h in state.in_hands()}
+    order = {relation: i for i, relation in enumerate(domain.containing)}
     edges: dict[str, list[Place]] = {}
     for r in graph.relations:
-        known = r.subject in state.kinds and r.object in state.kinds and r.subject != state.held
-        if known and r.predicate in ("inside", "on_top_of"):
+        known = r.subject in state.kinds and r.object in state.kinds and r.subject not in held
+        if known and r.predicate in order:
             edges.setdefault(r.subject, []).append(Place(r.predicate, r.object))
     places: dict[str, Place] = {}
     for name in sorted(edges, key=by_number):
-        if state.category(name).fixture:
+        if domain.roles.fixture in state.kind(name).tags:
             continue
         parents = {p.parent for p in edges[name]}
         outer = {q.parent for p in parents for q in edges.get(p, ())}
@@ -279,8 +361,8 @@ def _places(graph: SceneGraph, state: State) -> dict[str, Place]:
             edges[name],
             key=lambda p: (
                 p.parent in outer,
-                state.kinds[p.parent] == "Floor",
-                p.relation != "inside",
+                domain.is_a(state.kinds[p.parent], domain.roles.ground),
+                order[p.relation],
                 by_number(p.parent),
             ),
         )

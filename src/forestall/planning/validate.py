@@ -1,6 +1,6 @@
 """The validator: executes any plan, whoever made it, on an observed scene graph.
 
-Called by replanners, strategies and tests; calls `domain`. It names the first step that cannot run
+Called by replanners, strategies and tests; calls `execute`. It names the first step that cannot run
 and why, and then the goal facts that the plan leaves unmet.
 """
 
@@ -10,15 +10,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice, product
 
-from forestall.planning.domain import Refusal, apply, resolve
-from forestall.planning.effects import settle
-from forestall.planning.state import SUPPORTED, State
+from forestall.domain.model import LOCATED, Domain
+from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.settle import settle
+from forestall.planning.state import State, decided
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Goal
 from forestall.types.verdict import PlanCheck
-from forestall.vocabulary import Vocabulary
 
 MAX_BINDINGS = 2000
 
@@ -31,6 +31,7 @@ class Trace:
     step: int | None = None
     refusal: Refusal | None = None
     touched: frozenset[str] = frozenset()
+    meant: tuple[Subtask, ...] = ()  # what ran, every argument an instance
 
     @property
     def final(self) -> State:
@@ -40,23 +41,23 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class GraphValidator:
-    """Implements `PlanValidator` over the symbolic domain."""
+    """Implements `PlanValidator`: what `execute.apply` says on the observed graph."""
 
-    vocabulary: Vocabulary
+    domain: Domain
 
     def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
         """Execute the plan on the observed graph, then check the goal and what never may happen."""
-        trace = run(observed(graph, self.vocabulary), plan.subtasks)
+        trace = run(observed(graph, self.domain), plan.subtasks)
         assumed = _relied_on(trace, goal)
+        meant = Plan((*trace.meant, *plan.subtasks[len(trace.meant) :]), plan.goal)
         if trace.refusal is not None:
-            return PlanCheck(
-                False, trace.step, trace.refusal.reason, trace.refusal.lacking, (), assumed
-            )
+            reason, lacking = trace.refusal.reason, trace.refusal.lacking
+            return PlanCheck(False, trace.step, reason, lacking, (), assumed, meant)
         missing = unmet(trace.states, goal)
         reason = ""
         if missing:
             reason = "the plan runs, but its goal is not met: " + ", ".join(map(str, missing))
-        return PlanCheck(not missing, None, reason, (), missing, assumed)
+        return PlanCheck(not missing, None, reason, (), missing, assumed, meant)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +66,12 @@ class AcceptAll:
 
     def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
         """Say yes."""
-        return PlanCheck(True)
+        return PlanCheck(True, plan=plan)
 
 
-def observed(graph: SceneGraph, vocabulary: Vocabulary) -> State:
+def observed(graph: SceneGraph, domain: Domain) -> State:
     """The state of a graph, after what the running devices have done by now."""
-    state = State.from_graph(graph, vocabulary)
+    state = State.from_graph(graph, domain)
     settle(state)
     return state
 
@@ -79,16 +80,19 @@ def run(state: State, subtasks: Iterable[Subtask]) -> Trace:
     """Execute subtasks one after the other until one is refused."""
     states: list[State] = [state]
     touched: set[str] = set()
+    meant: list[Subtask] = []
     for step, subtask in enumerate(subtasks):
-        after = apply(states[-1], subtask)
+        before = states[-1]
+        args = resolve(before, subtask)
+        after = args if isinstance(args, Refusal) else apply(before, subtask)
         if isinstance(after, Refusal):
-            return Trace(tuple(states), step, after, frozenset(touched))
-        meant = resolve(states[-1].copy(), subtask)
-        if not isinstance(meant, Refusal):
-            for name in meant:
-                touched.update((name, *(p.parent for p in states[-1].chain(name))))
+            return Trace(tuple(states), step, after, frozenset(touched), tuple(meant))
+        assert not isinstance(args, Refusal)
+        for name in args:
+            touched.update((name, *(p.parent for p in before.chain(name))))
+        meant.append(Subtask(subtask.skill, args))
         states.append(after)
-    return Trace(tuple(states), None, None, frozenset(touched))
+    return Trace(tuple(states), None, None, frozenset(touched), tuple(meant))
 
 
 def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
@@ -107,7 +111,7 @@ def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
             best = missing + never
     if best is not None:
         return best
-    return tuple(Literal("located", (c,)) for _, c in goal.variables if not final.matches(c))
+    return tuple(Literal(LOCATED, (c,)) for _, c in goal.variables if not final.matches(c))
 
 
 def bindings(state: State, goal: Goal) -> Iterator[dict[str, str]]:
@@ -119,10 +123,26 @@ def bindings(state: State, goal: Goal) -> Iterator[dict[str, str]]:
             yield dict(zip(names, values, strict=True))
 
 
-def unsupported(literals: Iterable[Literal], vocabulary: Vocabulary) -> tuple[Literal, ...]:
+def as_checked(plan: Plan, check: PlanCheck, state: State) -> Plan:
+    """The plan to send: with the instances that it was checked with.
+
+    A category stays for a support of which any will do, and for what the state does not have yet.
+    """
+    if check.plan is None:
+        return plan
+    domain, steps = state.domain, []
+    for step, meant in zip(plan.subtasks, check.plan.subtasks, strict=True):
+        args = tuple(
+            m if m in state.kinds and not (n != m and domain.is_a(n, domain.roles.support)) else n
+            for n, m in zip(step.args, meant.args, strict=True)
+        )
+        steps.append(Subtask(step.skill, args))
+    return Plan(tuple(steps), plan.goal)
+
+
+def unsupported(literals: Iterable[Literal], domain: Domain) -> tuple[Literal, ...]:
     """Literals that no symbolic state can decide (geometry, unknown predicates)."""
-    known = {*SUPPORTED, *vocabulary.attributes}
-    return tuple(x for x in literals if x.predicate not in known)
+    return tuple(x for x in literals if not decided(domain, x))
 
 
 def _relied_on(trace: Trace, goal: Goal) -> tuple[Literal, ...]:

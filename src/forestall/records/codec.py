@@ -31,7 +31,6 @@ from forestall.records.fields import Field
 from forestall.records.plain import plain
 from forestall.records.verdicts import graph, literal, plan
 from forestall.types.episode import EpisodeEnd, EpisodeRecord
-from forestall.types.plan import Plan
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
 
@@ -57,9 +56,7 @@ def record_to_json(record: EpisodeRecord, *, page: str | None = None) -> dict[st
         "kind": KIND,
         "format": RECORD_FORMAT,
         "complete": complete,
-        **head_json(
-            record.task, record.initial_plan, record.scenario, record.strategy, record.seed
-        ),
+        **head_json(record),
         "success": record.success,
         "weak_success": record.weak_success,
         "failures": record.failures,
@@ -79,7 +76,6 @@ def record_to_json(record: EpisodeRecord, *, page: str | None = None) -> dict[st
         },
         "memory": dict(record.provenance).get("memory"),
         "versions": provenance_of(record, "versions"),
-        "provenance": dict(record.provenance),
         "page": page,
         "events": [event_json(e) for e in record.events],
         "harmed": record.harmed,
@@ -137,22 +133,23 @@ def check_header(data: Any) -> None:
         )
 
 
-def head_json(
-    task: Task, initial_plan: Plan, scenario: str | None, strategy: str, seed: int
-) -> dict[str, Any]:
+def head_json(record: EpisodeRecord) -> dict[str, Any]:
     """What is known of a run before it begins."""
+    task = record.task
     return {
         "task": task.name,
         "title": task.title,
+        "domain": task.domain,
         "goal": _goal_json(task.goal),
         "task_plan": task.plan.texts(),
         "task_plan_goal": task.plan.goal,
         "scene": _needs_json(task.scene),
-        "scenario": scenario,
-        "strategy": strategy,
-        "seed": seed,
-        "initial_plan": initial_plan.texts(),
-        "initial_plan_goal": initial_plan.goal,
+        "scenario": record.scenario,
+        "strategy": record.strategy,
+        "seed": record.seed,
+        "initial_plan": record.initial_plan.texts(),
+        "initial_plan_goal": record.initial_plan.goal,
+        "provenance": dict(record.provenance),
     }
 
 
@@ -195,6 +192,7 @@ def _task(field: Field) -> Task:
         ),
         plan=plan(field["task_plan"], field["task_plan_goal"]),
         scene=_needs(field["scene"]),
+        domain=field["domain"].text(),
     )
 
 

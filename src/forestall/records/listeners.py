@@ -17,9 +17,7 @@ from rich.text import Text
 from forestall.records.derived import in_words
 from forestall.types.decision import Outcome
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
-from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, When
-from forestall.types.task import Task
 from forestall.types.verdict import Decision
 
 
@@ -55,9 +53,10 @@ class ProgressLine:
         self._alarms = 0
         self._simulated_s = 0.0
 
-    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
+    def on_start(self, record: EpisodeRecord) -> None:
         """The episode begins."""
         self.close()
+        task, plan = record.task, record.initial_plan
         self._started = self._clock()
         self._task, self._now = task.name, "looking around"
         self._done, self._total, self._alarms, self._simulated_s = 0, len(plan), 0, 0.0
@@ -70,7 +69,7 @@ class ProgressLine:
             )
             self._live.start()
         elif not self._quiet:
-            self._say(f"{task.name}, seed {seed}: {len(plan)} subtasks")
+            self._say(f"{task.name}, seed {record.seed}: {len(plan)} subtasks")
 
     def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged."""

@@ -32,9 +32,7 @@ from forestall.records.pictures import encode_jpeg, file_name
 from forestall.records.plain import plain
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord
 from forestall.types.observation import Observation
-from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, When
-from forestall.types.task import Task
 
 RECORD_NAME = "record.json"
 LINES_NAME = "boundaries.jsonl"
@@ -48,30 +46,16 @@ class RunRecorder:
 
     Args:
         folder: made when the run starts.
-        scenario: name of the scenario, None for the undisturbed task.
-        strategy: name of the strategy.
-        provenance: what is known before the run: perception, memory, versions.
         page: where the page of this run will be, relative to the folder.
     """
 
-    def __init__(
-        self,
-        folder: Path | str,
-        *,
-        scenario: str | None = None,
-        strategy: str = "",
-        provenance: Mapping[str, Any] | None = None,
-        page: str | None = None,
-    ) -> None:
+    def __init__(self, folder: Path | str, *, page: str | None = None) -> None:
         self.folder = Path(folder)
-        self._scenario = scenario
-        self._strategy = strategy
-        self._provenance = dict(provenance or {})
         self._page = page
         self._started = False
         self._stored: list[BoundaryRecord] = []
 
-    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
+    def on_start(self, record: EpisodeRecord) -> None:
         """The episode begins."""
         self.folder.mkdir(parents=True, exist_ok=True)
         (self.folder / RECORD_NAME).unlink(missing_ok=True)
@@ -82,8 +66,7 @@ class RunRecorder:
             "start",
             kind=KIND,
             format=RECORD_FORMAT,
-            **head_json(task, plan, self._scenario, self._strategy, seed),
-            provenance=self._provenance,
+            **head_json(record),
         )
 
     def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import time
 
+from forestall.domain.model import Domain
 from forestall.planning.planner import plan_goal
 from forestall.planning.search import SearchConfig
-from forestall.planning.validate import observed
+from forestall.planning.validate import as_checked, observed
 from forestall.seams import PlanValidator
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome
-from forestall.vocabulary import Vocabulary
 
 
 class GoalReplanner:
@@ -23,17 +23,17 @@ class GoalReplanner:
 
     Args:
         validator: accepts or refuses the plan.
-        vocabulary: the categories.
+        domain: what is planned in.
         config: bounds of the search.
     """
 
     name = "goal planner"
 
     def __init__(
-        self, validator: PlanValidator, vocabulary: Vocabulary, config: SearchConfig | None = None
+        self, validator: PlanValidator, domain: Domain, config: SearchConfig | None = None
     ) -> None:
         self.validator = validator
-        self.vocabulary = vocabulary
+        self.domain = domain
         self.config = config or SearchConfig()
 
     def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
@@ -43,12 +43,15 @@ class GoalReplanner:
             outcome = ReplanOutcome.NOTHING_TO_CHANGE
             return Replan(outcome, producer=self.name, note=diagnosis.cause)
         goal = context.task.goal
-        planned = plan_goal(observed(context.graph, self.vocabulary), goal, self.config)
+        state = observed(context.graph, self.domain)
+        planned = plan_goal(state, goal, self.config)
         plan, check, outcome, note = None, None, planned.outcome, planned.note
         if outcome is ReplanOutcome.SOLVED:
             plan = Plan(planned.subtasks, context.plan.goal or goal.text)
             check = self.validator.check(plan, context.graph, goal)
-            if not check.ok:
+            if check.ok:
+                plan = as_checked(plan, check, state)
+            else:
                 outcome, note = ReplanOutcome.REJECTED, check.reason
         return Replan(
             outcome,

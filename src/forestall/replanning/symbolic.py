@@ -11,18 +11,19 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from forestall.domain.formula import literals
+from forestall.domain.model import Domain
+from forestall.planning.goals import alternatives
 from forestall.planning.planner import Planned, plan_goal, plan_to
-from forestall.planning.relevance import alternatives
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
-from forestall.planning.validate import observed, unsupported
+from forestall.planning.validate import as_checked, observed, unsupported
 from forestall.seams import PlanValidator
-from forestall.types.facts import GRIPPER, Literal, category_of
+from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext
 from forestall.types.task import Goal
 from forestall.types.verdict import Diagnosis, PlanCheck, Replan, ReplanOutcome
-from forestall.vocabulary import Vocabulary
 
 
 @dataclass(slots=True)
@@ -32,12 +33,14 @@ class _Attempts:
     start_s: float
     expanded: int = 0
     timed_out: bool = False
+    unproven: bool = False
     notes: tuple[str, ...] = ()
     rejected: tuple[Plan, PlanCheck] | None = None
 
     def count(self, planned: Planned) -> Planned:
         self.expanded += planned.expanded
         self.timed_out |= planned.outcome is ReplanOutcome.TIMEOUT
+        self.unproven = planned.outcome is not ReplanOutcome.UNSOLVABLE
         if planned.note:
             self.notes = (*self.notes, planned.note)
         return planned
@@ -48,17 +51,17 @@ class PlannerReplanner:
 
     Args:
         validator: accepts or refuses every plan.
-        vocabulary: the categories.
+        domain: what is planned in.
         config: bounds of each single search.
     """
 
     name = "planner"
 
     def __init__(
-        self, validator: PlanValidator, vocabulary: Vocabulary, config: SearchConfig | None = None
+        self, validator: PlanValidator, domain: Domain, config: SearchConfig | None = None
     ) -> None:
         self.validator = validator
-        self.vocabulary = vocabulary
+        self.domain = domain
         self.config = config or SearchConfig()
 
     def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
@@ -66,15 +69,15 @@ class PlannerReplanner:
         attempts = _Attempts(time.perf_counter())
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
-        wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.vocabulary)]
+        wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.domain)]
         if not wanted:
             names = ", ".join(map(str, diagnosis.must_change))
             return self._ended(attempts, ReplanOutcome.UNSUPPORTED, f"no skill is about {names}")
-        state = observed(context.graph, self.vocabulary)
+        state = observed(context.graph, self.domain)
         repairs: list[Planned] = []
         for repair in self._repairs(attempts, state, context, wanted, diagnosis.must_stay):
             for rest in _rests(context, state, bool(repair.subtasks)):
-                accepted = self._checked(attempts, context, (*repair.subtasks, *rest))
+                accepted = self._checked(attempts, context, state, (*repair.subtasks, *rest))
                 if accepted is not None:
                     return accepted
             repairs.append(repair)
@@ -84,7 +87,7 @@ class PlannerReplanner:
             onward = attempts.count(plan_goal(repair.final, context.task.goal, self.config))
             if onward.outcome is ReplanOutcome.SOLVED:
                 steps = (*repair.subtasks, *onward.subtasks)
-                accepted = self._checked(attempts, context, steps)
+                accepted = self._checked(attempts, context, state, steps)
                 if accepted is not None:
                     return accepted
         return self._failed(attempts, state, wanted)
@@ -97,12 +100,16 @@ class PlannerReplanner:
         wanted: list[Literal],
         must_stay: Sequence[Literal],
     ) -> Iterator[Planned]:
-        """Plans to what must change, keeping as much as possible of what should stay."""
+        """Plans to what must change, keeping as much as possible of what should stay.
+
+        Among everything, and not only what matters, is searched where nothing else was found.
+        """
         possible = wanted
         hand = _hand(state, wanted)
         safe = _unspoiled(state, context.task.goal, wanted)
         stay = [g for x in must_stay if (g := _as_it_is(state, x)) is not None]
-        tried = set()
+        tried: set[tuple[Literal, ...]] = set()
+        solved = False
         for kept in ([*hand, *stay], hand, hand[:1], []):
             facts = tuple(dict.fromkeys((*possible, *kept, *safe)))
             if facts in tried:
@@ -110,28 +117,45 @@ class PlannerReplanner:
             tried.add(facts)
             planned = self._plan(attempts, state, facts)
             if planned.outcome is ReplanOutcome.SOLVED:
+                solved = True
                 yield planned
         if len(wanted) > 1:
             possible = [x for x in wanted if self._can(state, x)]
             if possible and len(possible) < len(wanted):
                 yield from self._repairs(attempts, state, context, possible, must_stay)
+                return
+        if not solved:
+            planned = self._plan(attempts, state, (*wanted, *safe), widen=True)
+            if planned.outcome is ReplanOutcome.SOLVED:
+                yield planned
 
-    def _plan(self, attempts: _Attempts, state: State, facts: Sequence[Literal]) -> Planned:
+    def _plan(
+        self,
+        attempts: _Attempts,
+        state: State,
+        facts: Sequence[Literal],
+        widen: bool = False,
+    ) -> Planned:
         goals = alternatives(state, Goal("", literals=tuple(facts)))
-        planned = attempts.count(plan_to(state, goals, self.config))
+        planned = attempts.count(plan_to(state, goals, self.config, widen=widen))
         running = _left_running(state, planned, facts)
         if not running:
             return planned
         goals = alternatives(state, Goal("", literals=(*facts, *running)))
-        tidy = attempts.count(plan_to(state, goals, self.config))
+        tidy = attempts.count(plan_to(state, goals, self.config, widen=False))
         return tidy if tidy.outcome is ReplanOutcome.SOLVED else planned
 
     def _can(self, state: State, literal: Literal) -> bool:
         goals = alternatives(state, Goal("", literals=(literal,)))
-        return plan_to(state, goals, self.config).outcome is ReplanOutcome.SOLVED
+        planned = plan_to(state, goals, self.config, widen=False)
+        return planned.outcome is ReplanOutcome.SOLVED
 
     def _checked(
-        self, attempts: _Attempts, context: BoundaryContext, subtasks: Sequence[Subtask]
+        self,
+        attempts: _Attempts,
+        context: BoundaryContext,
+        state: State,
+        subtasks: Sequence[Subtask],
     ) -> Replan | None:
         plan = Plan(tuple(subtasks), context.plan.goal or context.task.goal.text)
         check = self.validator.check(plan, context.graph, context.task.goal)
@@ -140,7 +164,7 @@ class PlannerReplanner:
             return None
         return Replan(
             ReplanOutcome.SOLVED,
-            plan,
+            as_checked(plan, check, state),
             check,
             self.name,
             attempts.expanded,
@@ -148,7 +172,8 @@ class PlannerReplanner:
         )
 
     def _failed(self, attempts: _Attempts, state: State, wanted: list[Literal]) -> Replan:
-        lost = [a for x in wanted for a in x.args if a != GRIPPER and _is_lost(state, a)]
+        hands = self.domain.robot.hands
+        lost = [a for x in wanted for a in x.args if a not in hands and _is_lost(state, a)]
         if lost:
             note = f"{', '.join(dict.fromkeys(lost))}: its place is not known"
             return self._ended(attempts, ReplanOutcome.UNSOLVABLE, note)
@@ -157,6 +182,8 @@ class PlannerReplanner:
             return self._ended(attempts, ReplanOutcome.TIMEOUT, note)
         if attempts.rejected is not None and not attempts.notes:
             return self._ended(attempts, ReplanOutcome.REJECTED, attempts.rejected[1].reason)
+        if attempts.unproven:
+            return self._ended(attempts, ReplanOutcome.NOT_FOUND, note)
         return self._ended(attempts, ReplanOutcome.UNSOLVABLE, note)
 
     def _ended(self, attempts: _Attempts, outcome: ReplanOutcome, note: str) -> Replan:
@@ -174,27 +201,31 @@ class PlannerReplanner:
 
 
 def _hand(state: State, wanted: Sequence[Literal]) -> list[Literal]:
-    """What the hand holds, and what lies in or on that, should stay so."""
-    if any(x.predicate in ("held_by", "hand_empty") for x in wanted):
+    """What the hands hold, and what lies in or on that, should stay so."""
+    roles = state.domain.roles
+    if roles.holding is None or any(x.predicate in (roles.holding, roles.hand_empty) for x in wanted):
         return []
-    if state.held is None:
-        return [Literal("hand_empty", ())]
-    facts = [Literal("held_by", (state.held, GRIPPER))]
-    concerned = {a for x in wanted if x.predicate == "vacant" for a in x.args}
-    if state.held not in concerned:
-        for name in state.contents(state.held):
-            facts.append(Literal(state.places[name].relation, (name, state.held)))
+    held = list(state.in_hands())
+    if not held:
+        return [] if roles.hand_empty is None else [Literal(roles.hand_empty, ())]
+    facts = [Literal(roles.holding, (thing, hand)) for hand, thing in held]
+    concerned = {a for x in wanted if x.predicate == roles.vacant for a in x.args}
+    for _, thing in held:
+        for name in state.contents(thing) if thing not in concerned else ():
+            place = state.place(name)
+            assert place is not None
+            facts.append(Literal(place.relation, (name, thing)))
     return facts
 
 
 def _as_it_is(state: State, literal: Literal) -> Literal | None:
     """A literal that holds, with category names replaced by the instances that make it hold."""
-    if unsupported((literal,), state.vocabulary) or not state.holds(literal):
+    if unsupported((literal,), state.domain) or not state.holds(literal):
         return None
     if literal.value == "false":
         return literal
     for position, name in enumerate(literal.args):
-        if name == GRIPPER or name in state.kinds:
+        if name in state.domain.robot.hands or name in state.kinds:
             continue
         for instance in state.matches(name):
             ground = literal.bind({literal.args[position]: instance})
@@ -205,31 +236,50 @@ def _as_it_is(state: State, literal: Literal) -> Literal | None:
 
 
 def _unspoiled(state: State, goal: Goal, wanted: Sequence[Literal]) -> list[Literal]:
-    """What the repair handles and must not spoil, since the goal forbids it for good."""
+    """What must not happen to what the repair handles, since the goal forbids it for good."""
     kinds = dict(goal.variables)
-    guarded = {kinds.get(a, category_of(a)) for x in goal.never for a in x.args}
     handled = {a for x in wanted for a in x.args if a in state.kinds}
-    handled |= {state.held} if state.held is not None else set()
+    handled |= {h for _, h in state.in_hands()}
     handled |= {y for x in handled for y in state.contents(x)}
-    return [
-        Literal("spoiled", (x,), "false")
-        for x in sorted(handled)
-        if state.kinds[x] in guarded and x not in state.spoiled
-    ]
+    found = []
+    for ban in dict.fromkeys(x for x in goal.never if x.predicate in state.domain.histories):
+        guarded = {kinds.get(a, category_of(a)) for a in ban.args}
+        for name in sorted(handled):
+            if state.kinds[name] in guarded and not state.holds(Literal(ban.predicate, (name,))):
+                found.append(Literal(ban.predicate, (name,), "false"))
+    return list(dict.fromkeys(found))
 
 
 def _left_running(state: State, planned: Planned, facts: Sequence[Literal]) -> list[Literal]:
-    """Devices that a repair would leave on although they were off and nothing asks for it."""
+    """Devices that a repair would leave running although they did not and nothing asks for it."""
     if planned.final is None:
         return []
-    asked = {x.args[0] for x in facts if x.predicate == "toggled"}
-    return [
-        Literal("toggled", (name,), "off")
-        for name in sorted(state.kinds)
-        if state.value(name, "toggled") == "off"
-        and planned.final.value(name, "toggled") == "on"
-        and name not in asked
-    ]
+    found = []
+    for attribute, value in _running(state.domain):
+        asked = {x.args[0] for x in facts if x.predicate == attribute}
+        default = state.domain.values(attribute)[0]
+        found += [
+            Literal(attribute, (name,), default)
+            for name in sorted(state.kinds)
+            if state.value(name, attribute) == default
+            and planned.final.value(name, attribute) == value
+            and name not in asked
+        ]
+    return found
+
+
+def _running(domain: Domain) -> list[tuple[str, str]]:
+    """Values, other than the default, that let a process go on: that a device is on."""
+    found = {}
+    for process in domain.processes:
+        changed = {f.args[0] for e in process.effects for f in e.facts if f.args}
+        for literal, positive in literals(process.condition):
+            known = domain.attributes.get(literal.predicate)
+            if known is None or not positive or literal.args[0] in changed:
+                continue
+            if literal.value != known.values[0]:
+                found[literal.predicate, literal.value] = None
+    return list(found)
 
 
 def _rests(
@@ -242,12 +292,13 @@ def _rests(
     """
     rest = context.plan.subtasks[context.index :]
     before = context.plan.subtasks[context.index - 1 : context.index] if context.index else ()
-    if repaired and before and before[0].skill == "navigate_to_obj":
+    driving = state.domain.driving()
+    if repaired and before and driving is not None and before[0].skill == driving.name:
         rest = (*before, *rest)
     bound = {}
-    for name in (*context.subtask.args, *([state.held] if state.held else [])):
+    for name in (*context.subtask.args, *(h for _, h in state.in_hands())):
         kind = state.kinds.get(name)
-        if kind is None or state.category(name).fixture:
+        if kind is None or state.domain.is_a(kind, state.domain.roles.fixture):
             continue
         if len(state.instances(kind)) > 1:
             bound[kind] = name

@@ -12,13 +12,11 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from forestall.report.drawn import Drawn
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.verdict import Change, Discrepancy
 
-TREE = ("held_by", "inside", "on_top_of")
-_MIRROR = {"right_of": "left_of", "behind": "in_front_of", "below": "above"}
-_SYMMETRIC = ("near",)
 _WIDTHS = (
     (0.30, "ijltfI|.,:;'!()[]- "),
     (0.38, 'r"/\\*'),
@@ -63,6 +61,7 @@ class Side:
     name: str
     graph: SceneGraph
     common: Mapping[str, str]  # id → the id shared by matched nodes of both sides
+    drawn: Drawn
     parents: Mapping[str, Relation] = field(default_factory=dict)
 
     def path(self, node_id: str) -> Chain:
@@ -91,11 +90,14 @@ def clip(text: str, limit: int = 30) -> str:
 
 
 def sides(
-    observed: SceneGraph, expected: SceneGraph | None, matches: Sequence[tuple[str, str]]
+    observed: SceneGraph,
+    expected: SceneGraph | None,
+    matches: Sequence[tuple[str, str]],
+    drawn: Drawn,
 ) -> tuple[Side, Side | None]:
     """Both graphs in common terms; without matches, nodes with the same id are the same."""
     ids = {n.id: n.id for n in observed.nodes}
-    left = Side("observed", observed, ids, _parents(observed))
+    left = Side("observed", observed, ids, drawn, _parents(observed, drawn))
     if expected is None:
         return left, None
     pairs = {e: o for o, e in matches if observed.get(o) and expected.get(e)}
@@ -103,14 +105,14 @@ def sides(
         pairs = {n.id: n.id for n in expected.nodes if n.id in ids}
     pairs[GRIPPER] = GRIPPER
     common = {n.id: pairs.get(n.id, f"{n.id} (expected)") for n in expected.nodes}
-    return left, Side("expected", expected, common, _parents(expected))
+    return left, Side("expected", expected, common, drawn, _parents(expected, drawn))
 
 
-def _parents(graph: SceneGraph) -> dict[str, Relation]:
+def _parents(graph: SceneGraph, drawn: Drawn) -> dict[str, Relation]:
     """For each node the edge to its closest parent; cycles are cut."""
     edges: dict[str, list[Relation]] = {}
     for r in graph.relations:
-        if r.predicate in TREE and r.subject != r.object:
+        if r.predicate in drawn.tree and r.subject != r.object:
             edges.setdefault(r.subject, []).append(r)
 
     def ancestors(node_id: str) -> set[str]:
@@ -127,7 +129,7 @@ def _parents(graph: SceneGraph) -> dict[str, Relation]:
     for node_id in sorted(edges):
         best = min(
             edges[node_id],
-            key=lambda r: (r.predicate != "held_by", -len(ancestors(r.object)), r),
+            key=lambda r: (r.predicate != drawn.holding, -len(ancestors(r.object)), r),
         )
         climb: str | None = best.object
         while climb is not None and climb != node_id:
@@ -160,31 +162,34 @@ def slots(left: Side, right: Side | None) -> tuple[Slot, ...]:
 
 
 def lanes(side: Side, other: Side | None, said: Sequence[Discrepancy], limit: int) -> list[Lane]:
-    """Edges beside the tree: all that differ, "blocking", then others up to `limit`."""
-    drawn: dict[tuple[str, str], Lane] = {}
+    """Edges beside the tree: all that differ, what stands in the way, then others up to `limit`."""
+    lanes: dict[tuple[str, str], Lane] = {}
     for relation in sorted(beside(side), key=lambda r: (rank(side, other, said, r), r)):
         changed = differs(side, other, said, relation)
         pair = (relation.subject, relation.object)
         back = (relation.object, relation.subject)
         words = relation.predicate.replace("_", " ")
-        directed = relation.predicate not in _SYMMETRIC
-        place = pair if pair in drawn or directed or back not in drawn else back
-        known = drawn.get(place)
+        directed = relation.predicate not in side.drawn.symmetric
+        place = pair if pair in lanes or directed or back not in lanes else back
+        known = lanes.get(place)
         if known is not None and known.changed == changed:
-            drawn[place] = Lane(
+            lanes[place] = Lane(
                 *place, f"{known.label}, {words}", known.directed or directed, changed
             )
-        elif known is None and (changed or relation.predicate == "blocking" or len(drawn) < limit):
-            drawn[pair] = Lane(*pair, words, directed, changed)
-    return list(drawn.values())
+        elif known is None and (
+            changed or relation.predicate == side.drawn.strong or len(lanes) < limit
+        ):
+            lanes[pair] = Lane(*pair, words, directed, changed)
+    return list(lanes.values())
 
 
 def rank(side: Side, other: Side | None, said: Sequence[Discrepancy], relation: Relation) -> int:
     """Which lateral edges are drawn first."""
     if differs(side, other, said, relation):
         return 0
-    order = {"blocking": 1, "inside": 2, "on_top_of": 2, "in_front_of": 3, "left_of": 3}
-    return order.get(relation.predicate, 4)
+    if relation.predicate == side.drawn.strong:
+        return 1
+    return 2 if relation.predicate in side.drawn.containing else 3
 
 
 def beside(side: Side) -> list[Relation]:
@@ -194,12 +199,12 @@ def beside(side: Side) -> list[Relation]:
     for r in side.graph.relations:
         if (r.subject, r.object) in tree or r.subject == r.object:
             continue
-        if r.predicate in _MIRROR:
-            r = Relation(r.object, _MIRROR[r.predicate], r.subject)  # noqa: PLW2901
-        elif r.predicate in _SYMMETRIC and r.subject > r.object:
+        if r.predicate in side.drawn.mirror:
+            r = Relation(r.object, side.drawn.mirror[r.predicate], r.subject)  # noqa: PLW2901
+        elif r.predicate in side.drawn.symmetric and r.subject > r.object:
             r = Relation(r.object, r.predicate, r.subject)  # noqa: PLW2901
         line = {r.subject, r.object}
-        implied = r.predicate != "blocking" and any(
+        implied = r.predicate != side.drawn.strong and any(
             line <= set(_chain(side, end)) for end in sorted(line)
         )
         if not implied:
@@ -219,12 +224,12 @@ def differs(
 ) -> bool:
     """Whether an edge is missing on the other side in a way that matters.
 
-    Support, containment, holding and blocking count by themselves; "near" and its like only where a
+    Support, containment, holding and blocking count by themselves; the others only where a
     discrepancy speaks of them, because they differ between any two rooms.
     """
     if other is None:
         return False
-    if relation.predicate in (*TREE, "blocking"):
+    if relation.predicate in (*side.drawn.tree, side.drawn.strong):
         theirs = {
             (other.common[r.subject], r.predicate, other.common[r.object])
             for r in other.graph.relations
@@ -232,13 +237,13 @@ def differs(
         common = side.common
         return (common[relation.subject], relation.predicate, common[relation.object]) not in theirs
     kind = Change.EXTRA_RELATION if side.name == "observed" else Change.MISSING_RELATION
-    return any(_speaks_of(d, relation) for d in said if d.change is kind)
+    return any(_speaks_of(d, relation, side.drawn) for d in said if d.change is kind)
 
 
-def _speaks_of(discrepancy: Discrepancy, relation: Relation) -> bool:
+def _speaks_of(discrepancy: Discrepancy, relation: Relation, drawn: Drawn) -> bool:
     text = f"{discrepancy.text} {discrepancy.observed} {discrepancy.expected}".replace("_", " ")
     names = (relation.subject, relation.object)
-    mirrored = [k for k, v in _MIRROR.items() if v == relation.predicate]
+    mirrored = [k for k, v in drawn.mirror.items() if v == relation.predicate]
     words = [p.replace("_", " ") for p in (relation.predicate, *mirrored)]
     return any(w in text for w in words) and all(
         re.search(rf"(?<![\w-]){re.escape(n.replace('_', ' '))}(?![\w-])", text) for n in names

@@ -12,6 +12,7 @@ from html import escape
 from importlib.resources import files
 from typing import Literal
 
+from forestall.report.drawn import Drawn
 from forestall.report.graph_drawing import (
     BOX,
     EDGE,
@@ -39,6 +40,7 @@ def graph_svg(
     matches: Sequence[tuple[str, str]],
     discrepancies: Sequence[Discrepancy],
     side: SideName,
+    drawn: Drawn,
     *,
     done: bool = False,
     standalone: bool = False,
@@ -51,6 +53,7 @@ def graph_svg(
         matches: (observed id, expected id) pairs; none: nodes with the same id are the same.
         discrepancies: differences to mark beside those that follow from the matches.
         side: whether `graph` is the observed or the expected one.
+        drawn: which relations are drawn how.
         done: whether the subtask of the graphs is over; otherwise it comes next.
         standalone: carry namespace and style sheet along, for a file of its own.
 
@@ -60,7 +63,7 @@ def graph_svg(
     observed, expected = (graph, other) if side == "observed" else (other, graph)
     if observed is None:  # an expected graph alone is drawn like any single graph
         observed, expected = graph, None
-    left, right = sides(observed, expected, matches)
+    left, right = sides(observed, expected, matches, drawn)
     rows = slots(left, right)
     top = head_room(left, right)
     drawings = [
@@ -169,7 +172,8 @@ def _ports(drawing: Drawing, lane: Lane) -> tuple[float, float]:
 
 def _lane_class(drawing: Drawing, lane: Lane) -> str:
     mark = (" fg-extra" if drawing.me.name == "observed" else " fg-missing") * lane.changed
-    strong = " fg-blocking" if "blocking" in lane.label else ""
+    named = drawing.me.drawn.strong.replace("_", " ")
+    strong = " fg-blocking" if named and named in lane.label else ""
     return f"fg-lane{strong}{mark}"
 
 

@@ -26,6 +26,7 @@ from forestall.records.derived import (
 )
 from forestall.records.pictures import Picture, page_picture, rgb_of
 from forestall.records.plain import plain
+from forestall.report.drawn import Drawn, drawn
 from forestall.report.graph_svg import graph_svg
 from forestall.types.episode import EpisodeRecord, SkillStatus, StoredObservation
 from forestall.types.observation import Observation
@@ -160,7 +161,7 @@ def _card(
     observation = None if boundary is None else boundary.observation
     picture, views, thumb = _pictures(observation, budget, folder)
     bars, threshold = _bars(verdict)
-    observed, expected = _graphs(moment)
+    observed, expected = _graphs(moment, drawn(record.task.domain))
     outcome = None if boundary is None else outcome_of(boundary)
     rows: tuple[PlanRow, ...] = ()
     if boundary is not None and moment.after is not None:
@@ -227,18 +228,18 @@ def _bars(verdict: Verdict | None) -> tuple[tuple[Bar, ...], float]:
     )
 
 
-def _graphs(moment: Moment) -> tuple[str, str]:
+def _graphs(moment: Moment, how: Drawn) -> tuple[str, str]:
     boundary = moment.boundary
     if boundary is None:
         return "", ""
     verdict, done = boundary.verdict, moment.when is not When.BEFORE
     if verdict is None or verdict.nearest is None:
-        return graph_svg(boundary.scoped, None, (), (), "observed", done=done), ""
+        return graph_svg(boundary.scoped, None, (), (), "observed", how, done=done), ""
     seen, wanted = boundary.scoped, verdict.nearest.graph
     pairs, found = verdict.matches, verdict.discrepancies
     return (
-        graph_svg(seen, wanted, pairs, found, "observed", done=done),
-        graph_svg(wanted, seen, pairs, found, "expected", done=done),
+        graph_svg(seen, wanted, pairs, found, "observed", how, done=done),
+        graph_svg(wanted, seen, pairs, found, "expected", how, done=done),
     )
 
 

@@ -73,6 +73,7 @@ class Scenario:
         effect: the first step from then on that is refused or does harm because of it (a thing
             that breaks by falling: the step on which it falls), "end" where none is and the run
             merely ends without its goal; None likewise.
+        domain: whose it is, where it comes with the project.
 
     Both are a step in text form; " #2" behind it means its second occurrence.
     """
@@ -87,6 +88,7 @@ class Scenario:
     source: str = ""
     known: str | None = None
     effect: str | None = None
+    domain: str = ""
 
     @property
     def harmless(self) -> bool:
@@ -110,20 +112,22 @@ def schemas() -> dict[str, Any]:
     }
 
 
-def task_names(domain: str | None = None) -> tuple[str, ...]:
-    """Names of the shipped tasks, of one domain or of all."""
+def task_names(domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
+    """Names of the shipped tasks of a domain; None: of all."""
     return tuple(sorted(n for n, _, d in _shipped("tasks") if domain in (None, d)))
 
 
-def scenario_names(of: str | None = None) -> tuple[str, ...]:
-    """Names of the shipped scenarios, of one set or of all.
+def scenario_names(of: str | None = None, domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
+    """Names of the shipped scenarios of a domain (None: of all), of one set or of all.
 
     Raises:
         UnknownNameError: no such set.
     """
     if of is not None and of not in SETS:
         raise UnknownNameError("set of scenarios", of, SETS)
-    return tuple(n for n, s in _scenarios().items() if of in (None, s.set))
+    return tuple(
+        n for n, s in _scenarios().items() if of in (None, s.set) and domain in (None, s.domain)
+    )
 
 
 def load_task(name_or_file: str) -> LoadedTask:
@@ -159,20 +163,20 @@ def load_scenario(name_or_file: str) -> Scenario:
 def _scenarios() -> Mapping[str, Scenario]:
     """Every shipped scenario by name, in the order of sets, tasks and files."""
     found: dict[str, Scenario] = {}
-    for name, text, _ in sorted(_shipped("scenarios")):
+    for name, text, domain in sorted(_shipped("scenarios")):
         data = _validated(ScenarioFile, name, text)
-        found[data.name] = _scenario(data, data.task, SETS[0])
+        found[data.name] = _scenario(data, data.task, SETS[0], domain)
     for set_name in SETS[1:]:
-        for name, text, _ in sorted(_shipped("scenarios", set_name)):
+        for name, text, domain in sorted(_shipped("scenarios", set_name)):
             several = _validated(ScenarioSetFile, f"{set_name}/{name}", text)
             for one in several.scenarios:
                 if one.name in found:
                     raise InputError(f"{set_name}/{name}: there are two scenarios {one.name}")
-                found[one.name] = _scenario(one, several.task, set_name)
+                found[one.name] = _scenario(one, several.task, set_name, domain)
     return found
 
 
-def _scenario(data: ScenarioFields, task: str, set_name: str) -> Scenario:
+def _scenario(data: ScenarioFields, task: str, set_name: str, domain: str = "") -> Scenario:
     return Scenario(
         data.name,
         task,
@@ -184,6 +188,7 @@ def _scenario(data: ScenarioFields, task: str, set_name: str) -> Scenario:
         data.source,
         data.known,
         data.effect,
+        domain,
     )
 
 
@@ -248,7 +253,8 @@ def _task(source: str, data: TaskFile, of: str) -> LoadedTask:
         for subtask in plan:
             for name in subtask.args:
                 domain[name]
-        task = Task(data.name, data.title, goal, plan, _scene(data.scene, domain))
+        scene = _scene(data.scene, domain)
+        task = Task(data.name, data.title, goal, plan, scene, domain.name)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     return LoadedTask(task, domain)

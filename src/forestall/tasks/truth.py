@@ -17,7 +17,7 @@ from forestall.strategies.intervention import rest_of
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, When
-from forestall.types.task import Goal, Task
+from forestall.types.task import Goal
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class TruthTrace:
 
         self._look = look
 
-    def on_start(self, task: Task, plan: Plan, seed: int) -> None:
+    def on_start(self, record: EpisodeRecord) -> None:
         """Forget an earlier run."""
         self.moments.clear()
 

@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 
 from forestall.domain.evaluate import by_number
 from forestall.domain.model import Domain, PredicateKind
-from forestall.planning_new.execute import Refusal, apply, resolve
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.state import State
 from forestall.testing.symbolic_scene import relation_at, start_scene
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
 from forestall.types.facts import Literal

@@ -28,7 +28,7 @@ class Truth(Enum):
     UNOBSERVED = "unobserved"
 
 
-_TEXT = re.compile(r"^\s*(not\s+)?([a-z][a-z0-9_]*)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]\w*))?\s*$")
+_TEXT = re.compile(r"^\s*(not\s+)?([a-z_][a-z0-9_]*)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]\w*))?\s*$")
 
 
 @dataclass(frozen=True, slots=True, order=True)

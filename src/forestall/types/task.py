@@ -1,4 +1,4 @@
-"""A household task: words, goal condition, nominal plan, scene needs."""
+"""A task: words, goal condition, nominal plan, scene needs."""
 
 from __future__ import annotations
 
@@ -39,3 +39,4 @@ class Task:
     goal: Goal
     plan: Plan
     scene: SceneNeeds
+    domain: str = ""  # the name of its domain

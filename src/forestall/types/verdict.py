@@ -140,7 +140,8 @@ class ReplanOutcome(Enum):
 
     SOLVED = "solved"
     NOTHING_TO_CHANGE = "nothing to change"
-    UNSOLVABLE = "unsolvable"  # proven on the observed state
+    UNSOLVABLE = "unsolvable"  # proven on the observed state, with nothing left out
+    NOT_FOUND = "not found"  # the search was cut short or left something out; nothing is proven
     TIMEOUT = "timeout"
     REJECTED = "rejected"  # a plan was made and the validator refused it
     UNSUPPORTED = "unsupported"  # the goal cannot be expressed for this engine
@@ -160,6 +161,7 @@ class PlanCheck:
     lacking: tuple[Literal, ...] = ()
     unmet: tuple[Literal, ...] = ()
     assumed: tuple[Literal, ...] = ()  # unobserved facts that the plan relies on
+    plan: Plan | None = None  # the plan as it was checked: every argument an instance
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 
+from forestall.domain.load import shipped
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import category_of
 from forestall.types.observation import Intrinsics
 from forestall.types.plan import Subtask
 from forestall.types.scene import SceneNeeds
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.effects import EffectConfig
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatRenderer, FlatScene, FlatWorld
 
+CONTAINING = shipped("household").containing
 FIXTURES = {
     "CounterTop": 2, "DiningTable": 1, "Sink": 1, "Faucet": 1, "Fridge": 1, "Microwave": 1,
     "CoffeeMachine": 1, "Toaster": 1, "StoveBurner": 2, "StoveKnob": 2, "Cabinet": 1,
@@ -54,10 +55,10 @@ class SmallKitchen:
         self.world = FlatWorld(scene)
         self.env = KitchenEnvironment(
             SceneNeeds(),
-            household(),
+            shipped("household"),
             intrinsics=Intrinsics.from_vertical_fov(64, 48, 60.0),
             effect_config=EffectConfig(cool_down_s=cool_down_s),
-            build=lambda needs, seed, vocabulary: self.world,
+            build=lambda needs, seed, catalogue: self.world,
             make=lambda world, intrinsics: FlatRenderer(intrinsics),
         )
         self.env.reset(0)
@@ -78,17 +79,17 @@ class SmallKitchen:
 
     def refused(self, step: str) -> str:
         """Run a step that must be refused without any change of the truth; its reason."""
-        before = self.env.oracle.truth().text(), self.env.oracle.spoiled()
+        before = self.env.oracle.truth().text(), self.env.oracle.history()
         outcome = self.env.execute(Subtask.parse(step))
         assert outcome.status is SkillStatus.REFUSED, step
-        assert (self.env.oracle.truth().text(), self.env.oracle.spoiled()) == before
+        assert (self.env.oracle.truth().text(), self.env.oracle.history()) == before
         return outcome.reason
 
     def state(self, name: str, attribute: str) -> str | None:
         return self.env.oracle.states(name).get(attribute)
 
     def parent(self, name: str) -> str | None:
-        return next(iter(self.env.oracle.truth().parents(name)), None)
+        return next(iter(self.env.oracle.truth().parents(name, CONTAINING)), None)
 
     @property
     def held(self) -> str | None:
@@ -96,7 +97,7 @@ class SmallKitchen:
 
     @property
     def spoiled(self) -> set[str]:
-        return set(self.env.oracle.spoiled())
+        return {x.args[0] for x in self.env.oracle.history() if x.predicate == "spoiled"}
 
     def kinds(self) -> list[str]:
         return [e.kind for e in self.env.oracle.events()]

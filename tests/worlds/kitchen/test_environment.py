@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from small_kitchen import SmallKitchen
 
+from forestall.domain.load import extend, shipped
 from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household, parse_category
 from forestall.worlds.kitchen.environment import SCAN_FRAMES, KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
@@ -46,7 +46,7 @@ def test_the_gripper_knows_what_it_holds():
 
 
 def test_a_second_reset_with_the_same_seed_uses_the_same_world_from_its_start():
-    env = flat_environment(NEEDS, household())
+    env = flat_environment(NEEDS, shipped("household"))
     env.reset(4)
     start = env.oracle.truth()
     env.execute(Subtask.parse("pick_up(Mug)"))
@@ -62,11 +62,11 @@ def test_a_second_reset_with_the_same_seed_uses_the_same_world_from_its_start():
 
 def test_before_reset_there_is_a_clear_error():
     with pytest.raises(ForestallError, match="call reset"):
-        KitchenEnvironment(NEEDS, household()).observe()
+        KitchenEnvironment(NEEDS, shipped("household")).observe()
 
 
 def test_closing_and_resetting_again_works():
-    env = flat_environment(NEEDS, household())
+    env = flat_environment(NEEDS, shipped("household"))
     env.reset(1)
     env.close()
     with pytest.raises(ForestallError, match="call reset"):
@@ -78,29 +78,22 @@ def test_closing_and_resetting_again_works():
 def test_a_scene_that_cannot_be_built_is_a_scene_error():
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug", ("Toaster",)),))
     with pytest.raises(SceneError, match="Mug-1"):
-        flat_environment(needs, household()).reset(0)
+        flat_environment(needs, shipped("household")).reset(0)
 
 
 def test_a_running_device_works_from_the_start():
     needs = SceneNeeds(
         objects=(ObjectNeed("Mug-1", "Mug", ("Sink",)),), fixtures=(("Faucet-1", "toggled", "on"),)
     )
-    env = flat_environment(needs, household())
+    env = flat_environment(needs, shipped("household"))
     env.reset(0)
     assert env.oracle.states("Mug-1")["filled"] == "water"
 
 
 def test_a_new_category_from_a_task_file_follows_the_same_rules():
-    teapot = parse_category(
-        "Teapot",
-        {
-            "pickupable": True,
-            "attributes": ["filled", "dirty"],
-            "words": "teapot",
-        },
-    )
-    vocabulary = household().extended({"Teapot": teapot})
-    env = flat_environment(SceneNeeds(objects=(ObjectNeed("Teapot-1", "Teapot"),)), vocabulary)
+    teapot = {"tags": ["pickupable"], "attributes": ["filled", "dirty"], "words": "teapot"}
+    domain = extend(shipped("household"), {"Teapot": teapot}, {})
+    env = flat_environment(SceneNeeds(objects=(ObjectNeed("Teapot-1", "Teapot"),)), domain)
     env.reset(0)
     for step in ("pick_up(Teapot)", "put_in(Teapot, Sink)", "toggle_on(Faucet)"):
         assert env.execute(Subtask.parse(step)).status is SkillStatus.SUCCEEDED

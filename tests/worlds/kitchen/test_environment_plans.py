@@ -2,15 +2,16 @@
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.tasks.files import load_scenario, load_task, scenario_names
 from forestall.tasks.goals import TruthGoalChecker
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Plan, Subtask
-from forestall.vocabulary import household
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
+DOMAIN = shipped("household")
 PLANS = {
     "boil-water": """
         navigate_to_obj(Pot) pick_up(Pot) navigate_to_obj(Sink) put_in(Pot,Sink)
@@ -96,10 +97,10 @@ def _run(env, plan, seed):
 @pytest.mark.parametrize("task", sorted(PLANS))
 def test_a_nominal_plan_runs_and_reaches_its_goal(task):
     loaded = load_task(task).task
-    env = flat_environment(loaded.scene, household())
+    env = flat_environment(loaded.scene, DOMAIN)
     for seed in range(8):
         assert _run(env, _plan(task), seed) == []
-        assert TruthGoalChecker().check(loaded.goal, env.oracle) == (True, True, ())
+        assert TruthGoalChecker(DOMAIN).check(loaded.goal, env.oracle) == (True, True, ())
 
 
 EXPECTED = {
@@ -133,12 +134,12 @@ EXPECTED = {
 def test_a_scenario_makes_its_task_fail_at_the_step_concerned(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    needs = apply_scene_faults(task.scene, scenario.faults, household())
-    inner = flat_environment(needs, household())
-    env = wrap(inner, scenario.faults, inner)
-    plan = apply_plan_faults(_plan(task.name), scenario.faults)
+    needs = apply_scene_faults(task.scene, scenario.faults, DOMAIN)
+    inner = flat_environment(needs, DOMAIN)
+    env = wrap(inner, scenario.faults, inner, DOMAIN)
+    plan = apply_plan_faults(_plan(task.name), scenario.faults, DOMAIN)
     assert _run(env, plan, 2) == EXPECTED[name]
-    strict, _, failures = TruthGoalChecker().check(task.goal, inner.oracle)
+    strict, _, failures = TruthGoalChecker(DOMAIN).check(task.goal, inner.oracle)
     assert not strict
     assert failures
 
@@ -176,18 +177,16 @@ CORRECTED = {
 def test_a_scenario_can_be_overcome(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    env = flat_environment(
-        apply_scene_faults(task.scene, scenario.faults, household()), household()
-    )
+    env = flat_environment(apply_scene_faults(task.scene, scenario.faults, DOMAIN), DOMAIN)
     assert _run(env, Plan.parse(CORRECTED[name].split()), 2) == []
-    assert TruthGoalChecker().check(task.goal, env.oracle)[0]
+    assert TruthGoalChecker(DOMAIN).check(task.goal, env.oracle)[0]
 
 
 def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
     scenario = load_scenario("mug-dropped")
     task = load_task(scenario.task).task
-    inner = flat_environment(task.scene, household())
-    env = wrap(inner, scenario.faults, inner)
+    inner = flat_environment(task.scene, DOMAIN)
+    env = wrap(inner, scenario.faults, inner, DOMAIN)
     plan = _plan(task.name)
     env.reset(1)
     for subtask in plan.subtasks[:9]:
@@ -196,25 +195,25 @@ def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
     env.execute(Subtask.parse("pick_up(Mug)"))
     for subtask in plan.subtasks[8:]:
         assert env.execute(subtask).status is SkillStatus.SUCCEEDED
-    assert TruthGoalChecker().check(task.goal, inner.oracle)[0]
+    assert TruthGoalChecker(DOMAIN).check(task.goal, inner.oracle)[0]
 
 
 @pytest.mark.parametrize("task", sorted(PLANS))
 def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task):
     loaded = load_task(task).task
-    env = KitchenEnvironment(loaded.scene, household())
+    env = KitchenEnvironment(loaded.scene, DOMAIN)
     for seed in (101, 102):
         assert _run(env, _plan(task), seed) == []
-        assert TruthGoalChecker().check(loaded.goal, env.oracle) == (True, True, ())
+        assert TruthGoalChecker(DOMAIN).check(loaded.goal, env.oracle) == (True, True, ())
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
 def test_a_scenario_makes_its_task_fail_in_the_real_kitchen(name):
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
-    needs = apply_scene_faults(task.scene, scenario.faults, household())
-    inner = KitchenEnvironment(needs, household())
-    env = wrap(inner, scenario.faults, inner)
-    plan = apply_plan_faults(_plan(task.name), scenario.faults)
+    needs = apply_scene_faults(task.scene, scenario.faults, DOMAIN)
+    inner = KitchenEnvironment(needs, DOMAIN)
+    env = wrap(inner, scenario.faults, inner, DOMAIN)
+    plan = apply_plan_faults(_plan(task.name), scenario.faults, DOMAIN)
     assert _run(env, plan, 103)[:1] == EXPECTED[name][:1]
-    assert not TruthGoalChecker().check(task.goal, inner.oracle)[0]
+    assert not TruthGoalChecker(DOMAIN).check(task.goal, inner.oracle)[0]

@@ -2,18 +2,25 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_kitchen import SmallKitchen
+from small_kitchen import CONTAINING, SmallKitchen
 
+from forestall.domain.load import shipped
+from forestall.domain.truth import truth as truth_of
 from forestall.errors import UnknownNameError
 from forestall.types.facts import Literal, Truth
-from forestall.types.plan import SKILLS, Subtask
-from forestall.vocabulary import household
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Subtask
+from forestall.worlds.kitchen.catalogue import shipped_catalogue
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatScene, FlatWorld
 from forestall.worlds.kitchen.household import Household, natural_key
 
 
 def _home(*instances: FlatInstance) -> Household:
-    return Household(household(), FlatWorld(FlatScene(instances)), instances)
+    return Household(shipped_catalogue(), FlatWorld(FlatScene(instances)), instances)
+
+
+def _fact(truth: SceneGraph, text: str) -> Truth:
+    return truth_of(truth, Literal.parse(text), shipped("household"))
 
 
 def test_truth_has_everything_with_all_states_and_no_prepared_things():
@@ -22,11 +29,11 @@ def test_truth_has_everything_with_all_states_and_no_prepared_things():
     assert truth.get("Plate-1").states == (
         ("broken", "intact"), ("dirty", "dirty"), ("temperature", "room")
     )  # fmt: skip
-    assert truth.contents("Plate-1") == ("Potato-1",)
-    assert truth.contents("Microwave-1") == ("Plate-1",)
+    assert truth.contents("Plate-1", CONTAINING) == ("Potato-1",)
+    assert truth.contents("Microwave-1", CONTAINING) == ("Plate-1",)
     assert truth.get("PotatoSliced-1") is None
     assert truth.hidden == ()
-    assert truth.truth(Literal.parse("accessible(Potato-1)")) is Truth.FALSE
+    assert _fact(truth, "accessible(Potato-1)") is Truth.FALSE
 
 
 def test_truth_says_what_is_held_and_what_blocks():
@@ -37,8 +44,8 @@ def test_truth_says_what_is_held_and_what_blocks():
     kitchen.do("pick_up(Mug)")
     truth = kitchen.env.oracle.truth()
     assert truth.holding == "Mug-1"
-    assert truth.parents("Mug-1") == ()
-    assert truth.truth(Literal.parse("blocking(Pot-1, Knife-1)")) is Truth.TRUE
+    assert truth.parents("Mug-1", CONTAINING) == ()
+    assert _fact(truth, "blocking(Pot-1, Knife-1)") is Truth.TRUE
 
 
 def test_events_tell_the_history_in_facts():
@@ -112,12 +119,15 @@ def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed):
         "Egg-1@Fridge-1", "Bowl-1@CounterTop-1 filled=wine", "Knife-1@CounterTop-2",
         "Pan-1@StoveBurner-1", "StoveBurner-1 toggled=on",
     )  # fmt: skip
-    vocabulary = household()
-    verbs = sorted(SKILLS)
+    catalogue = shipped_catalogue()
+    skills = shipped("household").skills
+    verbs = sorted(skills)
     clock = 0.0
     for _ in range(40):
         verb = verbs[int(rng.integers(len(verbs)))]
-        args = tuple(THINGS[int(k)] for k in rng.integers(len(THINGS), size=len(SKILLS[verb])))
+        args = tuple(
+            THINGS[int(k)] for k in rng.integers(len(THINGS), size=len(skills[verb].roles))
+        )
         kitchen.env.execute(Subtask(verb, args))
         if rng.random() < 0.05:
             kitchen.env.drop_held()
@@ -125,13 +135,15 @@ def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed):
         clock = kitchen.env.time_s
     truth = kitchen.env.oracle.truth()
     for node in truth.nodes:
-        assert len(truth.parents(node.id)) <= 1
-        kind = vocabulary.find(node.category) and vocabulary[node.category].receptacle
-        contents = truth.contents(node.id)
+        assert len(truth.parents(node.id, CONTAINING)) <= 1
+        kind = catalogue.find(node.category) and catalogue[node.category].receptacle
+        contents = truth.contents(node.id, CONTAINING)
         if kind and kind.capacity is not None and "PotatoSliced-1" not in contents:
             assert len(contents) <= kind.capacity
     assert sum(r.predicate == "held_by" for r in truth.relations) <= 1
-    assert truth.holding is None or truth.parents(truth.holding) == ()
+    assert truth.holding is None or truth.parents(truth.holding, CONTAINING) == ()
     assert {n: p for n, p in kitchen.world._parents.items() if p} == {
-        n.id: truth.parents(n.id)[0] for n in truth.nodes if truth.parents(n.id)
+        n.id: truth.parents(n.id, CONTAINING)[0]
+        for n in truth.nodes
+        if truth.parents(n.id, CONTAINING)
     }

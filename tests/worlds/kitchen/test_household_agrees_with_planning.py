@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
-from small_kitchen import SmallKitchen
+from small_kitchen import CONTAINING, SmallKitchen
 
-from forestall.planning.domain import Refusal, State, apply
+from forestall.domain.load import shipped
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER
-from forestall.types.plan import SKILLS, Subtask
-from forestall.vocabulary import household
+from forestall.types.plan import Subtask
 
+SKILLS = shipped("household").skills
 CHOICES = [
     ["Mug-1@CounterTop-1", "Mug-1@CoffeeMachine-1 dirty=dirty", "Mug-1@Sink-1 filled=coffee"],
     ["Plate-1@DiningTable-1 dirty=dirty", "Plate-1@Microwave-1", "Plate-1@CounterTop-1"],
@@ -27,21 +29,23 @@ CHOICES = [
 def _truth(kitchen: SmallKitchen) -> dict:
     truth = kitchen.env.oracle.truth()
     facts = {(n.id, a): v for n in truth.nodes for a, v in n.states}
-    facts |= {(n.id, "parent"): truth.parents(n.id) for n in truth.nodes if n.id != GRIPPER}
+    facts |= {
+        (n.id, "parent"): truth.parents(n.id, CONTAINING) for n in truth.nodes if n.id != GRIPPER
+    }
     return facts | {"held": truth.holding, "spoiled": kitchen.spoiled}
 
 
 def _belief(state: State) -> dict:
     facts = dict(state.values)
     for name in state.kinds:
-        place = state.places.get(name)
+        place = state.place(name)
         facts[name, "parent"] = () if place is None else (place.parent,)
-    return facts | {"held": state.held, "spoiled": set(state.spoiled)}
+    return facts | {"held": state.held, "spoiled": {f[1] for f in state.facts if f[0] == "spoiled"}}
 
 
 def _random_subtask(rng: np.random.Generator, names: list[str], held: str | None) -> Subtask:
     verb = sorted(SKILLS)[int(rng.integers(len(SKILLS)))]
-    args = [names[int(i)] for i in rng.integers(len(names), size=len(SKILLS[verb]))]
+    args = [names[int(i)] for i in rng.integers(len(names), size=len(SKILLS[verb].roles))]
     if held is not None and len(args) == 2 and rng.random() < 0.8:
         args[0] = held
     if verb == "crack_obj" and "Egg-1" in names:
@@ -56,8 +60,8 @@ def test_planning_predicts_what_the_household_does(seed):
     rng = np.random.default_rng(seed)
     chosen = [str(options[int(rng.integers(len(options)))]) for options in CHOICES]
     kitchen = SmallKitchen(*chosen, cool_down_s=1e9)
-    state = State.from_graph(kitchen.env.oracle.truth(), household())
-    state.spoiled = frozenset(kitchen.spoiled)
+    state = State.from_graph(kitchen.env.oracle.truth(), shipped("household"))
+    [state.add(("spoiled", x)) for x in kitchen.spoiled]
     for _ in range(40):
         subtask = _random_subtask(rng, sorted(state.kinds), state.held)
         outcome = kitchen.env.execute(subtask)

@@ -8,26 +8,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import InputError, SceneError
 from forestall.tasks.faults import apply_scene_faults, parse_fault
 from forestall.tasks.files import load_task
-from forestall.types.scene import AXES, SceneNeeds
-from forestall.vocabulary import household
+from forestall.types.scene import SceneNeeds
+from forestall.worlds.kitchen.catalogue import shipped_catalogue
 from forestall.worlds.kitchen.model import build_scene
+from forestall.worlds.kitchen.needs import AXES
 from forestall.worlds.kitchen.settled import check_settled
 from forestall.worlds.kitchen.world import KitchenWorld
 
-VOCABULARY = household()
+DOMAIN = shipped("household")
 SEEDS = (40, 41, 42)
 
 
 def needs_of(task: str, *faults: Mapping[str, object]) -> SceneNeeds:
     scene = load_task(task).task.scene
-    return apply_scene_faults(scene, [parse_fault(f) for f in faults], VOCABULARY)
+    return apply_scene_faults(scene, [parse_fault(f) for f in faults], DOMAIN)
 
 
 def build(needs: SceneNeeds, seed: int) -> KitchenWorld:
-    return build_scene(needs, seed, VOCABULARY)
+    return build_scene(needs, seed, shipped_catalogue())
 
 
 def things(world: KitchenWorld) -> dict[str, bytes]:

@@ -8,16 +8,16 @@ import mujoco
 import numpy as np
 import pytest
 
+from forestall.domain.load import extend, shipped
 from forestall.errors import ForestallError, SceneError, UnknownNameError
 from forestall.types.facts import category_of
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household, parse_category
+from forestall.worlds.kitchen.catalogue import catalogue, shipped_catalogue
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.placement import footprint_at
 from forestall.worlds.kitchen.settled import check_settled
 from forestall.worlds.kitchen.world import KitchenWorld
 
-VOCABULARY = household()
 SALAD = SceneNeeds(
     objects=(
         ObjectNeed("Lettuce-1", "Lettuce"),
@@ -54,7 +54,7 @@ FIXTURES = {
 
 
 def build(needs: SceneNeeds, seed: int = 0) -> KitchenWorld:
-    return build_scene(needs, seed, VOCABULARY)
+    return build_scene(needs, seed, shipped_catalogue())
 
 
 @pytest.mark.parametrize("needs", [SALAD, DEVICES], ids=["kitchen", "living-room"])
@@ -185,23 +185,18 @@ def test_places_and_start_states_are_as_asked() -> None:
 
 def test_food_comes_with_its_slices_and_a_task_file_may_add_categories() -> None:
     more = {
-        "Teapot": parse_category(
-            "Teapot",
-            {
-                "pickupable": True,
-                "attributes": ["filled"],
-                "shape": {"kind": "vessel", "size_m": [0.14, 0.14, 0.12], "handle": True},
-            },
-        ),
-        "Gizmo": parse_category("Gizmo", {"pickupable": True}),
-        "Carrot": parse_category(
-            "Carrot",
-            {"pickupable": True, "food": True, "slices": 2, "slices_into": "PotatoSliced"},
-        ),
+        "Teapot": {
+            "tags": ["pickupable"],
+            "attributes": ["filled"],
+            "size_m": [0.14, 0.14, 0.12],
+            "world": {"shape": {"kind": "vessel", "handle": True}},
+        },
+        "Gizmo": {"tags": ["pickupable"]},
+        "Carrot": {"tags": ["pickupable", "food"], "slices": 2, "slices_into": ["PotatoSliced"]},
     }
-    vocabulary = VOCABULARY.extended(more)
+    added = catalogue(extend(shipped("household"), more, {}))
     objects = tuple(ObjectNeed(f"{c}-1", c) for c in more)
-    world = build_scene(SceneNeeds(objects=objects, clutter=(0, 0)), 0, vocabulary)
+    world = build_scene(SceneNeeds(objects=objects, clutter=(0, 0)), 0, added)
     assert check_settled(world) == ()
     made = [i for i in world.instances if i.prepared]
     assert [(i.name, i.made_from) for i in made] == [

@@ -8,14 +8,13 @@ import pytest
 
 from forestall.errors import SceneError
 from forestall.types.scene import ObjectNeed, SceneNeeds
-from forestall.vocabulary import household
+from forestall.worlds.kitchen.catalogue import shipped_catalogue
 from forestall.worlds.kitchen.forms import FLOOR
 from forestall.worlds.kitchen.model import build_scene
 from forestall.worlds.kitchen.navigation import EYE_HEIGHT_M
 from forestall.worlds.kitchen.settled import check_settled
 from forestall.worlds.kitchen.world import KitchenWorld
 
-VOCABULARY = household()
 NEEDS = SceneNeeds(
     objects=(
         ObjectNeed("Bowl-1", "Bowl", places=("Microwave",)),
@@ -32,7 +31,7 @@ SEEN = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
 
 
 def build(seed: int = 0, needs: SceneNeeds = NEEDS) -> KitchenWorld:
-    return build_scene(needs, seed, VOCABULARY)
+    return build_scene(needs, seed, shipped_catalogue())
 
 
 def seen_from_the_head(world: KitchenWorld, name: str) -> bool:

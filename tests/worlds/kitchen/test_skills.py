@@ -1,14 +1,15 @@
 import pytest
 from small_kitchen import SmallKitchen
 
+from forestall.domain.load import shipped
 from forestall.errors import SceneError
 from forestall.types.episode import SkillStatus
-from forestall.types.plan import SKILLS, Subtask
+from forestall.types.plan import Subtask
 from forestall.worlds.kitchen.skills import SKILL_TABLE, SkillTimes
 
 
 def test_every_verb_has_a_skill():
-    assert set(SKILL_TABLE) == set(SKILLS)
+    assert set(SKILL_TABLE) == set(shipped("household").skills)
 
 
 REFUSALS = [

@@ -1,7 +1,7 @@
 """Named random streams of one scene: what one of them draws never changes what another draws.
 
 `model` makes them; `plans`, `contents`, `stocking` and `changes` draw from them. A stream belongs
-to an axis of variety (`forestall.types.scene.AXES`) or to nothing that varies alone (places). Which
+to an axis of variety (`needs.AXES`) or to nothing that varies alone (places). Which
 layout is being tried enters the streams of the room and of places, not those of looks, so that a
 scene that needs its second layout keeps its colours.
 """

@@ -15,7 +15,7 @@ SMALL = Intrinsics.from_vertical_fov(96, 72, 60.0)
 
 def kitchen(frames: FrameMemory | None) -> KitchenEnvironment:
     loaded = load_task("make-coffee")
-    return KitchenEnvironment(loaded.task.scene, loaded.vocabulary, intrinsics=SMALL, frames=frames)
+    return KitchenEnvironment(loaded.task.scene, loaded.domain, intrinsics=SMALL, frames=frames)
 
 
 def same(a: Observation, b: Observation) -> bool:

@@ -1,0 +1,261 @@
+"""What can be true of a set of things, and the facts that ground formulas are made of.
+
+Called by `ground` and by the functions that `schemas` compiles (it implements their `World`).
+Facts are numbered from 2; what no skill and no process can bring about is false for good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from forestall.domain.evaluate import static_holds
+from forestall.domain.model import Domain, PredicateKind
+from forestall.planning.nodes import Junction, Node, all_of, assuming
+from forestall.planning.problem import Atom
+from forestall.planning.schemas import Schemas
+from forestall.planning.state import State
+from forestall.types.facts import category_of
+
+EXISTS = "exists"
+_FIRST = 2
+
+
+@dataclass(frozen=True)
+class Universe:
+    """What a problem is about.
+
+    Args:
+        things: existing things, in order.
+        made: (source, skill, variable) → names of what the skill makes of the source.
+        purposeful: what may be put anywhere it fits; other things are only put away. None: all.
+        supports: where things are put away.
+        bounded: whether something could be made more often than is modelled.
+    """
+
+    things: tuple[str, ...]
+    made: Mapping[tuple[str, str, str], tuple[str, ...]] = field(default_factory=dict)
+    purposeful: frozenset[str] | None = None
+    supports: tuple[str, ...] = ()
+    bounded: bool = False
+
+    def allows(self, domain: Domain, thing: str, place: str) -> bool:
+        """Whether a plan may put a thing to a place."""
+        if self.purposeful is None:
+            return True
+        if place not in self.purposeful and any(domain.is_a(place, t) for t in domain.roles.avoid):
+            return False
+        return thing in self.purposeful or place in self.supports
+
+
+class Grounder:
+    """Implements `schemas.World` over a universe and what is possible in it."""
+
+    def __init__(self, state: State, universe: Universe, schemas: Schemas) -> None:
+        self.state, self.universe, self.schemas = state, universe, schemas
+        self.domain = state.domain
+        made = [n for names in universe.made.values() for n in names]
+        self.names: tuple[str, ...] = tuple(dict.fromkeys((*universe.things, *made)))
+        self.categories = {n: state.kinds.get(n) or category_of(n) for n in self.names}
+        for hand in self.domain.robot.hands:
+            self.categories[hand] = hand
+        self.maybe: set[str] = set(made)
+        self.facing: str | None = None
+        self.driven: str | None = None
+        self.atoms: list[Atom] = [("",)] * _FIRST
+        self.ids: dict[Atom, int] = {}
+        self.definitions: dict[int, Node] = {}
+        self.opposites: dict[int, int] = {}
+        self._kinds: dict[str, tuple[str, ...]] = {}
+        self._static: dict[tuple[str, ...], bool] = {}
+        self._static_related: dict[tuple[object, ...], tuple[str, ...]] = {}
+        self._possible: dict[tuple[str, int, str], dict[str, None]] = {}
+        self.possible: set[Atom] = set()
+        self._derived: dict[Atom, Node] = {}
+        self._about: dict[str, dict[Atom, None]] = {}
+
+    # --- what is possible ------------------------------------------------------------------------
+
+    def allow(self, atom: Atom) -> bool:
+        """Let a relation be possible; whether that is news."""
+        if atom in self.possible:
+            return False
+        self.possible.add(atom)
+        for arg in atom[1:]:
+            self._about.setdefault(arg, {})[atom] = None
+        if len(atom) == 3:
+            self._possible.setdefault((atom[0], 0, atom[2]), {})[atom[1]] = None
+            self._possible.setdefault((atom[0], 1, atom[1]), {})[atom[2]] = None
+        return True
+
+    def about(self, name: str) -> Iterable[Atom]:
+        """Possible relations of a thing."""
+        return self._about.get(name, ())
+
+    def rivals(self, atom: Atom) -> list[int]:
+        """Possible relations that exclude one, by their group."""
+        group = self.domain.predicates[atom[0]].group
+        if group is None:
+            return []
+        predicates = self.domain.predicates
+        return [
+            self.number_of(a)
+            for a in self.about(atom[1])
+            if a[1] == atom[1] and a != atom and predicates[a[0]].group == group
+        ]
+
+    def number_of(self, atom: Atom) -> int:
+        """The number of a fact."""
+        found = self.ids.get(atom)
+        if found is None:
+            found = self.ids[atom] = len(self.atoms)
+            self.atoms.append(atom)
+        return found
+
+    def forget(self) -> None:
+        """Derived facts are to be grounded anew, since more has become possible."""
+        self._derived.clear()
+        self.definitions.clear()
+
+    # --- World -----------------------------------------------------------------------------------
+
+    def things(self) -> Sequence[str]:
+        """Every thing."""
+        return self.names
+
+    def of_kind(self, kind: str) -> Sequence[str]:
+        """Things that count as a kind."""
+        found = self._kinds.get(kind)
+        if found is None:
+            kinds, categories = self.domain.kinds, self.categories
+            found = tuple(n for n in self.names if kind in kinds(categories[n]))
+            self._kinds[kind] = found
+        return found
+
+    def is_a(self, name: str, kind: str) -> bool:
+        """Whether a thing counts as a kind."""
+        category = self.categories.get(name)
+        return kind in self.domain.kinds(category or category_of(self.domain.canonical(name)))
+
+    def same_category(self, one: str, other: str) -> bool:
+        """Whether two things are of one category."""
+        return self.categories.get(one) == self.categories.get(other)
+
+    def located(self, name: str) -> bool:
+        """Whether the place of a thing is known, which no skill changes."""
+        return name in self.categories and name not in self.state.lost
+
+    def faced(self, name: str) -> Node:
+        """Whether the robot faces a thing: it can drive there."""
+        if self.facing is None:
+            self.driven = name
+            return True
+        return self.facing == name
+
+    def static(self, predicate: str, args: tuple[str, ...]) -> bool:
+        """Whether a static predicate holds."""
+        key = (predicate, *args)
+        found = self._static.get(key)
+        if found is None:
+            known = all(a in self.categories for a in args)
+            found = known and static_holds(self.state, predicate, args)
+            self._static[key] = found
+        return found
+
+    def static_related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
+        """What fits at a position of a static predicate."""
+        key = (predicate, position, *args[:position], *args[position + 1 :])
+        found = self._static_related.get(key)
+        if found is None:
+            given = {i: self.categories.get(a) for i, a in enumerate(args) if i != position}
+            fitting = {
+                row[position]
+                for row in self.domain.statics.get(predicate, ())
+                if all(row[i] == c for i, c in given.items())
+            }
+            found = tuple(
+                n
+                for c in sorted(fitting)
+                for n in self.of_kind(c)
+                if self.categories[n] == c
+                and self.static(predicate, (*args[:position], n, *args[position + 1 :]))
+            )
+            self._static_related[key] = found
+        return found
+
+    def value(self, name: str, attribute: str, value: str) -> Node:
+        """The fact that an attribute has a value."""
+        category = self.domain.categories.get(self.categories.get(name, ""))
+        if category is None or attribute not in category.attributes:
+            return False
+        return self.number_of((attribute, name, value))
+
+    def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
+        """A relation or history."""
+        atom = (predicate, *args)
+        if atom in self.possible:
+            return self.number_of(atom)
+        if self.domain.predicates[predicate].kind is PredicateKind.HISTORY:
+            if all(a in self.categories for a in args):
+                return self.number_of(atom)
+        return False
+
+    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
+        """What may stand at a position of a relation."""
+        if len(args) == 2:
+            return tuple(self._possible.get((predicate, position, args[1 - position]), ()))
+        return tuple(
+            dict.fromkeys(
+                a[position + 1]
+                for a in sorted(self.possible)
+                if a[0] == predicate
+                and all(i == position or a[i + 1] == g for i, g in enumerate(args))
+            )
+        )
+
+    def derived(self, predicate: str, args: tuple[str, ...]) -> Node:
+        """A derived fact: its own definition, or a fact of its own where that leads back to it."""
+        atom = (predicate, *args)
+        found = self._derived.get(atom)
+        if found is not None:
+            return found
+        known = self.domain.predicates[predicate]
+        assert known.definition is not None
+        number = self._derived[atom] = self.number_of(atom)
+        self.definitions.pop(number, None)
+        names = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
+        node = self.schemas.formula(known.definition)(self, names)
+        if isinstance(node, Junction):
+            self.definitions[number] = node
+            return number
+        if node == number:
+            node = False
+        self._derived[atom] = node
+        self.definitions[number] = node
+        return node
+
+    def existing(self, name: str, node: Node) -> Node:
+        """A node about a thing, which holds only while that exists."""
+        if name not in self.maybe or node is False:
+            return node
+        base = self.definitions
+        absent = assuming(
+            node, lambda f: False if f not in base and name in self.atoms[f][1:] else None
+        )
+        return node if absent is False else all_of((node, self.exists(name)))
+
+    def exists(self, name: str) -> Node:
+        """The fact that a thing exists."""
+        return self.number_of((EXISTS, name)) if name in self.maybe else True
+
+    def number(self, name: str, what: str) -> int | None:
+        """A number of a thing."""
+        return self.domain.number(self.categories.get(name, name), what)
+
+    def chosen(self, name: str, ask: Callable[[], Node]) -> Node:
+        """A node judged while the robot faces a thing."""
+        before, self.facing = self.facing, name
+        try:
+            return ask()
+        finally:
+            self.facing = before

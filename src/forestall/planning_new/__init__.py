@@ -1,1 +1,0 @@
-"""Skills as a planning domain: validate any plan, ground, search, export."""

@@ -1,0 +1,5 @@
+(define (problem above)
+  (:domain blocks-derived)
+  (:objects a b c d - block)
+  (:init (ontable a) (on b a) (ontable c) (ontable d))
+  (:goal (and (above d a) (above d b) (clear c))))

@@ -1,0 +1,5 @@
+(define (problem sussman)
+  (:domain blocksworld)
+  (:objects A B C)
+  (:init (ontable a) (ontable b) (on c a) (clear b) (clear c) (handempty))
+  (:goal (and (on a b) (on b c))))

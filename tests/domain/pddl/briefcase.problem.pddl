@@ -1,0 +1,5 @@
+(define (problem get-paid)
+  (:domain briefcase)
+  (:objects paycheck dictionary - portable home office - location)
+  (:init (at paycheck home) (at dictionary home) (in paycheck) (is-at home))
+  (:goal (and (at dictionary office) (at paycheck home))))

@@ -1,0 +1,7 @@
+(define (problem change-lines)
+  (:domain bus)
+  (:objects b10 b11 - bus east west mid - stop n10 n11 - line1 rita - rider)
+  (:init (serves2 b10 n10) (serves2 b11 n11) (route1 n10 east mid) (route1 n11 mid west)
+         (same-stop east east) (same-stop mid mid) (same-stop west west)
+         (at b10 east) (at b11 mid) (waits rita east))
+  (:goal (waits rita west)))

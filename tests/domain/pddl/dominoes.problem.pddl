@@ -1,0 +1,5 @@
+(define (problem three-stones)
+  (:domain dominoes)
+  (:objects a b c - stone)
+  (:init (next a b) (next b c) (glued b))
+  (:goal (and (forall (?s - stone) (fallen ?s)) (glued b))))

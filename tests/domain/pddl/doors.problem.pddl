@@ -1,0 +1,6 @@
+(define (problem way-out)
+  (:domain doors)
+  (:objects front back - door hall yard street - room brass-key - item)
+  (:init (in hall) (lies crowbar hall) (lies brass-key yard) (fits brass-key front)
+         (joins back hall yard) (joins front hall street) (locked front) (locked back))
+  (:goal (and (in street) (has brass-key))))

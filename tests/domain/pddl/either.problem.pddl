@@ -1,0 +1,5 @@
+(define (problem dock-work)
+  (:domain either)
+  (:objects c - small-crate d1 d2 - drum p - pallet north south - dock)
+  (:init (at c north) (at d1 north) (at d2 north))
+  (:goal (and (at c south) (at d1 south) (at d2 north))))

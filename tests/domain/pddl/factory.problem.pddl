@@ -1,0 +1,5 @@
+(define (problem shift)
+  (:domain factory)
+  (:objects generic - machine p1 - press l1 - lathe bolt nut - part paper)
+  (:init (works l1) (raw bolt) (raw nut))
+  (:goal (and (made bolt generic) (made nut p1) (approved paper))))

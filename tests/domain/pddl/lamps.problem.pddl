@@ -1,0 +1,6 @@
+(define (problem evening)
+  (:domain lamps)
+  (:objects l1 l2 - lamp vase - thing den hall - room)
+  (:init (stands-in l1 den) (stands-in l2 hall) (stands-in vase den) (free-hand)
+         (cracked l1) (whole l2) (whole vase) (lit l2))
+  (:goal (and (lit l1) (not (lit l2)) (stands-in l1 hall) (not (cracked l1)))))

@@ -1,0 +1,6 @@
+(define (problem three-floors)
+  (:domain miconic)
+  (:objects p q - passenger f0 f1 f2 - floor)
+  (:init (above f0 f1) (above f0 f2) (above f1 f2) (lift-at f1)
+         (origin p f0) (destin p f2) (origin q f0) (destin q f1))
+  (:goal (forall (?p - passenger) (served ?p))))

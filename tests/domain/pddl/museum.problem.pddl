@@ -1,0 +1,5 @@
+(define (problem opening)
+  (:domain museum)
+  (:objects r1 r2 - room g1 g2 - guard vase mask - exhibit)
+  (:init (in vase r1) (in mask r2) (stands g1 r1) (stands g2 r2) (asleep g2) (door r1 r2))
+  (:goal (opened)))

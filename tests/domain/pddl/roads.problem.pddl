@@ -1,0 +1,6 @@
+(define (problem round-trip)
+  (:domain roads)
+  (:objects t - truck n1 n2 n3 n4 n5 - town)
+  (:init (at t n1) (road n1 n2) (road n2 n3) (road n3 n1) (road n3 n4) (blocked n3 n4)
+         (road n4 n5) (road n5 n4))
+  (:goal (and (at t n5) (not (reachable n5 n1)))))

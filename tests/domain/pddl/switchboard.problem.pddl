@@ -1,0 +1,5 @@
+(define (problem all-off)
+  (:domain switchboard)
+  (:objects l1 l2 l3 - lamp b1 b2 b3 - button)
+  (:init (lit l1) (lit l3) (wired b1 l1) (wired b1 l2) (wired b2 l2) (wired b2 l3) (wired b3 l3))
+  (:goal (forall (?l - lamp) (not (lit ?l)))))

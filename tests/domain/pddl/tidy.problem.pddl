@@ -1,0 +1,7 @@
+(define (problem tidy-up)
+  (:domain tidy)
+  (:objects ball car doll - toy red blue - box)
+  (:init (on-floor ball) (on-floor car) (in doll red))
+  (:goal (and (forall (?t - toy) (not (on-floor ?t)))
+              (forall (?b - box) (not (open ?b)))
+              (exists (?b - box) (and (in ball ?b) (in car ?b))))))

@@ -1,0 +1,6 @@
+(define (problem four-places)
+  (:domain visit-all)
+  (:objects nw ne sw se - place)
+  (:init (connected nw ne) (connected ne nw) (connected ne se) (connected se ne)
+         (connected se sw) (connected sw se) (at-robot nw) (visited nw))
+  (:goal (forall (?x - place) (visited ?x))))

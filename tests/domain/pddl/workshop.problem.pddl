@@ -1,0 +1,5 @@
+(define (problem one-part)
+  (:domain workshop)
+  (:objects ann bob - worker saw file - tool rail - part b1 - bench)
+  (:init (at ann b1) (at bob b1) (clamped rail b1) (rack saw) (holds ann file))
+  (:goal (and (cut rail) (forall (?t - tool) (rack ?t)))))
