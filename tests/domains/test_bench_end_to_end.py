@@ -64,6 +64,29 @@ def test_an_undisturbed_run_is_let_alone(memory, task):
         assert all(b.verdict.decision is Decision.PROCEED for b in record.boundaries)
 
 
+@pytest.mark.parametrize("task", task_names("household"))
+def test_the_tasks_of_the_household_run_in_a_symbolic_world(task):
+    for seed in range(3):
+        config = run_config(task, seed=seed, given=SYMBOLIC, strategy="none")
+        record = run_episode(prepare(config), None)
+        assert record.success, record.failures
+
+
+def test_a_run_in_the_bench_has_its_own_parts_unless_others_are_said():
+    def names(**named):
+        return {c.kind: c.name for c in run_config("glue-peg", **named).choices}
+
+    assert (names()["world"], names()["perceiver"]) == ("symbolic", "given-graph")
+    assert names(perceiver="graph")["perceiver"] == "graph"
+    assert {c.kind: c.name for c in run_config("make-coffee").choices}["world"] == "kitchen"
+
+
+def test_pictures_are_asked_for_in_a_sentence():
+    config = run_config("glue-peg", perceiver="graph", strategy="none")
+    record = run_episode(prepare(config), None)
+    assert "use the perceiver given-graph" in record.failures[0]
+
+
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_without_a_warning_the_scenario_fails_where_it_says(memory, name):
     scenario = load_scenario(name)

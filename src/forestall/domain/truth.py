@@ -132,8 +132,8 @@ class GraphView:
                 for i in ids
             ]
         values = [literal_truth(g, self, {}) for g in ground]
-        if not values:
-            return Truth.UNOBSERVED
+        if not values:  # of what is not there nothing is true, and every denial is
+            return Truth.TRUE if literal.value == "false" else Truth.UNOBSERVED
         return _TRUTH[min(values) if literal.value == "false" else max(values)]
 
 
