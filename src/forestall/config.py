@@ -13,7 +13,7 @@ FRAME_HEIGHT = 480
 VERTICAL_FOV_DEG = 60.0
 
 DEMONSTRATION_SEEDS = 1_000_000
-"""First seed of demonstration scenes; runs and surveys take seeds below."""
+"""First seed of demonstration scenes; runs and experiments take seeds below."""
 
 PICTURE_SEEDS = {
     "train": 2_000_000,

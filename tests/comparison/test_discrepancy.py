@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 from graph_pairs import (
     BLOCKED,
     CLOSED,
@@ -17,7 +19,7 @@ from graph_pairs import (
 from forestall.comparison.score import ScoreConfig, compare
 from forestall.domain.load import shipped
 from forestall.embeddings import HashedTextEncoder
-from forestall.types.graph import SceneGraph
+from forestall.types.graph import SceneGraph, Seen
 from forestall.types.verdict import Change, Discrepancy
 
 DOMAIN = shipped("household")
@@ -84,5 +86,10 @@ def test_missing_things() -> None:
 
 def test_a_closed_inside_is_unobserved_and_not_empty() -> None:
     expected = scene("Fridge-1; Egg-1", "Egg-1 inside Fridge-1")
-    found = differences(scene("Fridge-1; Egg-1", hidden=("Fridge-1",)), expected)
+    in_sight = scene("Fridge-1; Egg-1", hidden=("Fridge-1",))
+    nodes = (replace(n, seen=Seen.REMEMBERED) if n.id == "Egg-1" else n for n in in_sight.nodes)
+    found = differences(replace(in_sight, nodes=tuple(nodes)), expected)
     assert [(d.change, d.observed) for d in found] == [(Change.MISSING_RELATION, "unobserved")]
+    found = differences(in_sight, expected)
+    assert [(d.change, d.observed) for d in found] == [(Change.MISSING_RELATION, "")]
+    assert "Egg-1 is not inside Fridge-1" in found[0].text

@@ -57,9 +57,15 @@ def test_lifted_literals() -> None:
         "on_top_of(Potato, ?object)",
         "open(?target)=open",
         "toggled(?target)=off",
-        "unblocked(?object)",
         "vacant(?target)",
     }
+
+
+def test_nothing_in_front_is_lifted_where_the_skill_needs_the_way_clear() -> None:
+    graph = scene("gripper; Mug-1; Sink-1", "", "pick_up(Mug-1)")
+    for text, lifted in (("pick_up(Mug-1)", True), ("put_in(Mug-1, Sink-1)", False)):
+        found = {str(x) for x in lift(graph, Subtask.parse(text), DOMAIN)}
+        assert ("unblocked(?object)" in found) is lifted
 
 
 def test_counters_and_fridges_are_never_vacant() -> None:

@@ -23,11 +23,11 @@ from forestall.types.verdict import (
     Verdict,
     Violation,
 )
-from planning.corpus import DOMAIN, GOALS, PLANS, VOCABULARY, home_of, scene
+from planning.corpus import DOMAIN, GOALS, PLANS, home_of, scene
 from planning.episodes import context, demonstrations, ground, seen
 
 ALARM = Verdict(Decision.REPLAN, "test", 0.5, 0.9, Calibration.FIXED)
-REASONER = SymbolicReasoner(mine, violations, VOCABULARY)
+REASONER = SymbolicReasoner(mine, violations, DOMAIN)
 
 
 def diagnose(task: str, before: str, where: str, plan: Plan | None = None) -> Diagnosis:
@@ -163,18 +163,18 @@ def scripted(lifted: str, ground_fact: str, support: int = 4) -> Diagnosis:
     """The diagnosis of one scripted violation in a kitchen scene."""
     rule = Precondition("put_in", Literal.parse(lifted), support, 4)
 
-    def mined(references: object, vocabulary: object, **_: object) -> Sequence[Precondition]:
+    def mined(references: object, domain: object, **_: object) -> Sequence[Precondition]:
         return (rule,)
 
     def broken(
-        preconditions: Sequence[Precondition], graph: SceneGraph, subtask: Subtask
+        preconditions: Sequence[Precondition], graph: SceneGraph, subtask: Subtask, domain: Domain
     ) -> Sequence[Violation]:
         return (Violation(rule, Literal.parse(ground_fact), Truth.FALSE),)
 
     graph = scene(home_of("make-coffee"), "Cup-1 held, Potato-1 on Plate-1, Mug-1 is hot")
     index = PLANS["make-coffee"].texts().index("put_in(Mug, CoffeeMachine)")
     known = demonstrations("make-coffee", 1)[index]
-    reasoner = SymbolicReasoner(mined, broken, VOCABULARY)
+    reasoner = SymbolicReasoner(mined, broken, DOMAIN)
     return reasoner.diagnose(
         context("make-coffee", PLANS["make-coffee"], index, graph, known), ALARM
     )
@@ -246,12 +246,10 @@ def test_diagnosis_and_repair_save_the_task(name: str) -> None:
         state = states[-1]
         if fault and str(steps.subtasks[index]) == "put_in(Mug, CoffeeMachine)":
             fault = False
-            put = state.copy()
-            put.held = None
-            put.places["Mug-1"] = next(
-                iter(observed(scene("Mug-1 on Floor-1"), DOMAIN).places.values())
-            )
-            states[-1] = state = put
+            state = state.copy()
+            state.add(("on_top_of", "Mug-1", "Floor-1"))
+            assert state.held is None and state.root("Mug-1") == "Floor-1"
+            states[-1] = state
         text = str(steps.subtasks[index])
         left = len(steps) - index
         same = [i for i, t in enumerate(nominal) if t == text]

@@ -262,10 +262,13 @@ def whole_graph() -> SceneGraph:
 
 
 def scoped(
-    text: str, config: ScopeConfig | None = None, domain: Domain = shipped("household")
+    text: str, config: ScopeConfig | None = None, domain: Domain | None = None
 ) -> SceneGraph:
     perceiver = GraphPerceiver(
-        InstanceSegmenter(), GivenStateEstimator({}), domain, scope_config=config
+        InstanceSegmenter(),
+        GivenStateEstimator({}),
+        domain or shipped("household"),
+        scope_config=config,
     )
     return perceiver.scope(whole_graph(), Subtask.parse(text))
 

@@ -222,7 +222,7 @@ REPAIRS: dict[str, Repair] = {
 
 
 def without_numbers(steps: Plan) -> list[tuple[str, ...]]:
-    return [(s.skill, *(category_of(a) for a in s.args)) for s in steps]
+    return [(s.skill, *(category_of(DOMAIN.canonical(a)) for a in s.args)) for s in steps]
 
 
 def attempt(case: Repair, config: SearchConfig | None = None) -> tuple[Replan, Plan]:
@@ -279,7 +279,7 @@ def test_dirty_plate_is_washed_and_the_potato_picked_up_again() -> None:
     texts = answer.plan.texts()
     for step in ("put_in(Plate-1, Sink-1)", "toggle_on(Faucet-1)", "toggle_off(Faucet-1)"):
         assert step in texts
-    assert texts.index("pick_up(Potato-1)") < texts.index("put_on(Potato, Plate)")
+    assert texts.index("pick_up(Potato-1)") < texts.index("put_on(Potato-1, Plate-1)")
 
 
 def test_wine_is_poured_away_and_not_into_food() -> None:
@@ -312,11 +312,11 @@ def test_what_no_skill_is_about_is_unsupported() -> None:
     assert answer.outcome is ReplanOutcome.UNSUPPORTED
 
 
-def test_time_running_out_is_told() -> None:
+def test_a_search_that_is_cut_short_is_told() -> None:
     answer, _ = attempt(
         REPAIRS["bowl in the microwave, plate in hand"], SearchConfig(max_expansions=1)
     )
-    assert answer.outcome is ReplanOutcome.TIMEOUT
+    assert answer.outcome is ReplanOutcome.NOT_FOUND
 
 
 def test_what_should_stay_gives_way_when_it_makes_the_repair_impossible() -> None:
@@ -368,5 +368,5 @@ def test_the_thing_at_hand_is_named_where_there_are_several() -> None:
         Diagnosis("a cup is in the way", (Literal.parse("vacant(CoffeeMachine-1)"),)),
     )
     assert answer.plan is not None
-    assert "put_in(Mug-2, CoffeeMachine)" in answer.plan.texts()
+    assert "put_in(Mug-2, CoffeeMachine-1)" in answer.plan.texts()
     assert not any("Mug-1" in t for t in answer.plan.texts())

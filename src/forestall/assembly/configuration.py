@@ -68,13 +68,10 @@ class Choice:
         """Given and defaulted."""
         return {**dict(self.defaulted), **dict(self.given)}
 
-    def to_json(self) -> dict[str, Any]:
-        """As it stands in records."""
-        return {
-            "name": self.name,
-            "given": dict(self.given),
-            "defaulted": dict(self.defaulted),
-        }
+    def to_json(self, defaulted: bool = True) -> dict[str, Any]:
+        """As it stands in records; `defaulted`: with what was left to defaults."""
+        said = {"name": self.name, "given": dict(self.given)}
+        return {**said, "defaulted": dict(self.defaulted)} if defaulted else said
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,8 +196,12 @@ class RunConfig:
         """The part of a kind."""
         return next(c for c in self.choices if c.kind == kind.name)
 
-    def to_json(self) -> dict[str, Any]:
-        """As it stands in records: what was given, and what was left to defaults."""
+    def to_json(self, defaulted: bool = True) -> dict[str, Any]:
+        """As it stands in records: what was given, and what was left to defaults.
+
+        Args:
+            defaulted: with the defaults, which a folder of many runs has once.
+        """
         return {
             "task": self.task,
             "scenario": self.scenario,
@@ -208,7 +209,7 @@ class RunConfig:
             "without": self.without,
             "keep_observations": self.keep_observations,
             "final_look": self.final_look,
-            "parts": {c.kind: c.to_json() for c in self.choices},
+            "parts": {c.kind: c.to_json(defaulted) for c in self.choices},
         }
 
 

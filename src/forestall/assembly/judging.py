@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from inspect import signature
 from typing import Annotated, Any, TypeVar
 
 from forestall.assembly.configuration import SWITCHES
@@ -50,6 +51,12 @@ from forestall.strategies.watch import Watch
 from forestall.types.kind import Settled
 
 S = TypeVar("S")
+
+_PROACTIVE, _POST_HOC, _ONLINE = (
+    signature(strategy).parameters["max_attempts"].default
+    for strategy in (Proactive, PostHoc, Online)
+)
+"""How often each strategy tries, as it has it by itself."""
 
 
 def sqlite(*, path: str | None = None, busy_timeout_s: float = 5.0) -> SqliteStore:
@@ -160,22 +167,22 @@ def graph_validator(parts: Parts) -> GraphValidator:
     return GraphValidator(parts.domain)
 
 
-def proactive(parts: Parts, *, max_attempts: int | None = None) -> Proactive:
+def proactive(parts: Parts, *, max_attempts: int = _PROACTIVE) -> Proactive:
     """Ours: before each subtask."""
     return _stepping_in(Proactive, parts, max_attempts)
 
 
-def post_hoc(parts: Parts, *, max_attempts: int | None = None) -> PostHoc:
+def post_hoc(parts: Parts, *, max_attempts: int = _POST_HOC) -> PostHoc:
     """After the whole task (REFLECT)."""
     return _stepping_in(PostHoc, parts, max_attempts)
 
 
-def online(parts: Parts, *, max_attempts: int | None = None) -> Online:
+def online(parts: Parts, *, max_attempts: int = _ONLINE) -> Online:
     """After each subtask, by its own outcome (REFLECT, online)."""
     return _stepping_in(Online, parts, max_attempts, _scoping(parts))
 
 
-def online_scene(parts: Parts, *, max_attempts: int | None = None) -> OnlineScene:
+def online_scene(parts: Parts, *, max_attempts: int = _ONLINE) -> OnlineScene:
     """After each subtask, by the scene."""
     return _stepping_in(OnlineScene, parts, max_attempts, _scoping(parts))
 
@@ -184,10 +191,7 @@ def _scoping(parts: Parts) -> Callable[..., Any]:
     return partial(scope, domain=parts.domain, config=ScopeConfig())
 
 
-def _stepping_in(
-    strategy: Callable[..., S], parts: Parts, max_attempts: int | None, *more: Any
-) -> S:
-    limits = {} if max_attempts is None else {"max_attempts": max_attempts}
+def _stepping_in(strategy: Callable[..., S], parts: Parts, max_attempts: int, *more: Any) -> S:
     return strategy(
         parts.part(RETRIEVER),
         parts.part(DETECTOR),
@@ -195,7 +199,7 @@ def _stepping_in(
         parts.part(REPLANNER),
         parts.part(VALIDATOR),
         *more,
-        **limits,
+        max_attempts=max_attempts,
     )
 
 

@@ -18,6 +18,7 @@ from forestall.cli import experiments
 from forestall.cli.bench import bench
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
+from forestall.cli.domain import domain
 from forestall.cli.encoder import encoder
 from forestall.cli.flags import spelt
 from forestall.cli.inspect import check, compare
@@ -36,6 +37,7 @@ app = App(
 for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
     app.command(command)
 app.command(demos)
+app.command(domain)
 app.command(bench)
 experiments.register(bench)
 app.command(encoder)

@@ -30,7 +30,7 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
     - states of the arguments: dirty(?object)=clean, open(?target)=open, ... (before driving
       somewhere not whether that is open or on: it makes no difference to driving);
     - vacant(?x) for receptacles with a capacity and for vessels;
-    - unblocked(?object); accessible(?x) for what can be picked up;
+    - accessible(?x) for what can be picked up; unblocked(?x) for what of it the skill needs clear;
     - held_by(?x, gripper), hand_empty(), and held_by(Lettuce, gripper) for what is no argument;
     - inside(?object, ?target) and on_top_of(?object, ?target), or their negations;
     - contents by category, inside(Potato, ?target), but not of tables, counters and shelves.

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 
 from forestall.domain.formula import Formula, Parameter, free, literals, variables
+from forestall.domain.located import keyed
 from forestall.domain.model import (
     BUILT_IN,
     FACING,
@@ -60,17 +61,18 @@ def check_domain(domain: Domain) -> None:
         label, known = f"safety rule {rule.name}", {p.name for p in rule.variables}
         _within(keys, _check, domain, label, rule.never, known)
         if rule.when not in ("", "leaving", *domain.skills):
-            raise UnknownNameError(f"when of {label}", rule.when, ("leaving", *domain.skills))
+            known_whens = ("leaving", *domain.skills)
+            raise keyed(UnknownNameError(f"when of {label}", rule.when, known_whens), *keys)
     _roles(domain)
     for thing, category in domain.constants:
         if category not in domain.categories:
-            raise _with_keys(
+            raise keyed(
                 UnknownNameError(f"category of constant {thing}", category, domain.categories),
                 "[constants]",
             )
     for name in domain.robot.skills:
         if name not in domain.skills:
-            raise UnknownNameError("skill of the robot", name, domain.skills)
+            raise keyed(UnknownNameError("skill of the robot", name, domain.skills), "[robot]")
     from forestall.domain.settling import check_settling
 
     check_settling(domain)
@@ -194,7 +196,7 @@ def _stratified(domain: Domain) -> None:
     for name in uses:
         path = _way_back(uses, name, name, negative=False, seen=set())
         if path is not None:
-            raise _with_keys(
+            raise keyed(
                 InputError(
                     f"definition of {name} is cyclic: it depends on its own opposite "
                     f"({' -> '.join((name, *path))})"
@@ -238,13 +240,13 @@ def _roles(domain: Domain) -> None:
                 p.name: p for p in domain.predicates.values() if p.kind is _ROLE_KINDS[f.name]
             }
             if given is not None and given not in fitting:
-                raise _with_keys(
+                raise keyed(
                     UnknownNameError(f"predicate in roles.{f.name}", given, fitting), "[roles]"
                 )
         elif isinstance(given, tuple):
             for tag in given:
                 if tag not in domain.tags:
-                    raise _with_keys(
+                    raise keyed(
                         UnknownNameError(f"tag in roles.{f.name}", tag, domain.tags), "[roles]"
                     )
 
@@ -253,13 +255,8 @@ def _keys(*keys: str) -> tuple[str, ...]:
     return keys
 
 
-def _with_keys(error: InputError, *keys: str) -> InputError:
-    error.keys = keys  # type: ignore[attr-defined]
-    return error
-
-
 def _within(keys: tuple[str, ...], call: object, *args: object) -> None:
     try:
         call(*args)  # type: ignore[operator]
     except InputError as error:
-        raise _with_keys(error, *keys) from None
+        raise keyed(error, *keys) from None

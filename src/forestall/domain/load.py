@@ -17,6 +17,7 @@ from typing import Any
 
 from forestall.domain.checks import check_domain
 from forestall.domain.formula import parse_formula
+from forestall.domain.located import keyed, located
 from forestall.domain.model import (
     BUILT_IN,
     Category,
@@ -29,7 +30,7 @@ from forestall.domain.model import (
 from forestall.domain.phrases import attribute_values, check_apart, check_text, phrase_table, texts
 from forestall.domain.phrases import table as as_table
 from forestall.domain.schemas_in import parameter, read_process, read_safety, read_skill
-from forestall.errors import DomainError, FileFormatError, InputError, UnknownNameError
+from forestall.errors import FileFormatError, InputError, UnknownNameError
 
 _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
@@ -96,17 +97,9 @@ def read_domain(text: str, source: str) -> Domain:
     except tomllib.TOMLDecodeError as error:
         raise FileFormatError(f"{source}: not valid TOML: {error}") from error
     try:
-        domain = build_domain(data)
+        return build_domain(data)
     except InputError as error:
         raise located(source, text, error) from error
-    return domain
-
-
-def located(source: str, text: str, error: InputError) -> DomainError:
-    """The error with the file and the line of what it speaks about, as far as that is found."""
-    where = next((k for k in getattr(error, "keys", ()) if k in text), None)
-    line = "" if where is None else f", line {text[: text.index(where)].count(chr(10)) + 1}"
-    return DomainError(f"{source}{line}: {error}")
 
 
 def build_domain(data: Mapping[str, Any]) -> Domain:
@@ -129,7 +122,7 @@ def build_domain(data: Mapping[str, Any]) -> Domain:
         if "like" in table:
             like = table.pop("like")
             if like not in tables:
-                raise _keyed(UnknownNameError(f"skill that {skill} is like", like, tables), like)
+                raise keyed(UnknownNameError(f"skill that {skill} is like", like, tables), like)
             table.update({k: v for k, v in tables[like].items() if k not in table})
         skills[skill] = _keyed_call(f"[skills.{skill}]", read_skill, skill, table, events, domain)
     domain = replace(
@@ -188,7 +181,7 @@ def extend(domain: Domain, categories: Mapping[str, Any], attributes: Mapping[st
 def _open_facts(
     domain: Domain, predicate: str, name: str, new: Mapping[str, Any]
 ) -> set[tuple[str, ...]]:
-    spec = dict(domain.categories[name].extra).get(f"#{predicate}", ())
+    spec = domain.categories[name].extra.get(f"#{predicate}", ())
     assert isinstance(spec, tuple)
     found = chosen(domain, predicate, name, spec)
     return {(name, other) for other in found if other in new}
@@ -393,23 +386,18 @@ def _pairs(key: str, data: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     table = as_table(key, data.get(key, {}))
     for name, value in table.items():
         if not isinstance(value, str):
-            raise _keyed(InputError(f"{key}: {name} must be a text"), f"[{key}]")
+            raise keyed(InputError(f"{key}: {name} must be a text"), f"[{key}]")
     return tuple(table.items())
 
 
 def _known(label: str, table: Mapping[str, Any], known: Sequence[str]) -> None:
     for key in table:
         if key not in known:
-            raise _keyed(UnknownNameError(f"field of {label}", key, known), key)
-
-
-def _keyed(error: InputError, *keys: str) -> InputError:
-    error.keys = (*getattr(error, "keys", ()), *keys)  # type: ignore[attr-defined]
-    return error
+            raise keyed(UnknownNameError(f"field of {label}", key, known), key)
 
 
 def _keyed_call(header: str, call: Any, *args: Any) -> Any:
     try:
         return call(*args)
     except InputError as error:
-        raise _keyed(error, header) from None
+        raise keyed(error, header) from None

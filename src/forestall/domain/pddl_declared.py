@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from forestall.domain.formula import Parameter
+from forestall.domain.located import keyed
 from forestall.domain.model import BUILT_IN
 from forestall.domain.pddl_formula import Reader, Value
 from forestall.domain.pddl_text import (
@@ -40,7 +41,7 @@ class Declared:
         constants: name → type.
         predicates: PDDL name → (our name, parameters).
         tags: union of types → the types.
-        spelling: our name → that of the file, where they differ.
+        spelling: our name → that of the file.
     """
 
     grouped: dict[str, dict[str, str]]
@@ -154,7 +155,7 @@ class Declared:
                     error = unknown(
                         Word("", 0), f"predicate in values of attribute {attribute}", key, free
                     )
-                    raise _keyed(InputError(str(error)), f"[attributes.{attribute}")
+                    raise keyed(InputError(str(error)), f"[attributes.{attribute}")
                 values[key] = Value(attribute, value, otherwise)
         return values
 
@@ -195,6 +196,11 @@ def value_key(attribute: str, value: str) -> str:
     return f"{attribute}={value}"
 
 
+def differing(spelling: dict[str, str]) -> dict[str, str]:
+    """Names, in order, that a file spells in another way."""
+    return {name: spelt for name, spelt in sorted(spelling.items()) if name != spelt}
+
+
 def things_of(
     section: Group, types: Types, known: dict[str, str], spelling: dict[str, str]
 ) -> dict[str, str]:
@@ -227,10 +233,4 @@ def spell(spelling: dict[str, str], name: str, word: Word) -> None:
         raise AtLineError(
             word.line, f"{before} and {word} would both be called {name} here: rename one"
         )
-    if word.text != name:
-        spelling[name] = word.text
-
-
-def _keyed(error: InputError, *keys: str) -> InputError:
-    error.keys = keys  # type: ignore[attr-defined]
-    return error
+    spelling[name] = word.text

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from forestall.domain.formula import TRUE, And, Formula, Or, Parameter, bind, show
-from forestall.domain.load import build_domain, located
+from forestall.domain.load import build_domain
+from forestall.domain.located import located
 from forestall.domain.model import Domain
-from forestall.domain.pddl_declared import Declared, plain, value_key
+from forestall.domain.pddl_declared import Declared, differing, plain, value_key
 from forestall.domain.pddl_formula import Reader, Value, apart
 from forestall.domain.pddl_notes import Notes
 from forestall.domain.pddl_text import (
@@ -270,7 +271,7 @@ class _Found(Declared):
             },
             "skills": skills,
             "constants": dict(sorted(self.constants.items())),
-            "spelling": dict(sorted({**self.spelling, **self._value_names()}.items())),
+            "spelling": {**differing(self.spelling), **self._value_names()},
         }
 
     def _value_names(self) -> dict[str, str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from forestall.domain.formula import parse_formula, show
-from forestall.domain.load import located
+from forestall.domain.located import keyed, located
 from forestall.domain.phrases import table as as_table
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 
@@ -83,7 +83,7 @@ class Notes:
                     error = UnknownNameError(
                         f"name in the annotations of {section}", name, merged[section]
                     )
-                    raise _keyed(error, f"[{section}.{name}")
+                    raise keyed(error, f"[{section}.{name}")
                 target = merged[section][name]
                 for key, value in given.items():
                     if key == "refusals":
@@ -100,7 +100,7 @@ def _values(name: str, table: Mapping[str, Any]) -> dict[str, str]:
     otherwise = [v for v, p in given.items() if p == ""]
     fits = all(isinstance(p, str) for p in given.values()) and len(given) > 1
     if not fits or len(otherwise) > (len(given) == 2):
-        raise _keyed(
+        raise keyed(
             InputError(
                 f"attribute {name}: values must name a predicate for each value, the default "
                 'first; of two values one may be "": values = { off = "", on = "lit" }'
@@ -116,9 +116,9 @@ def _refusals(skill: str, needs: list[dict[str, Any]], given: Mapping[str, Any])
         fact = show(parse_formula(text))
         if fact not in facts:
             error = UnknownNameError(f"need in the refusals of skill {skill}", fact, facts)
-            raise _keyed(error, f"[skills.{skill}")
+            raise keyed(error, f"[skills.{skill}")
         if not isinstance(sentence, str):
-            raise _keyed(
+            raise keyed(
                 InputError(f"skill {skill}: the refusal for {fact} must be a text"),
                 f"[skills.{skill}",
             )
@@ -129,9 +129,4 @@ def _fields(label: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
     known = tuple(known)
     for key in table:
         if key not in known:
-            raise _keyed(UnknownNameError(f"field of {label}", key, known), key)
-
-
-def _keyed(error: InputError, *keys: str) -> InputError:
-    error.keys = keys  # type: ignore[attr-defined]
-    return error
+            raise keyed(UnknownNameError(f"field of {label}", key, known), key)

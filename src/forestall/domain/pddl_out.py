@@ -104,6 +104,8 @@ def domain_pddl(
     blocks: list[str] = []
     used, numbers = _used(writer, domain, skills)
     for skill, variant in sorted(variants, key=lambda x: writer.name(x[1].name)):
+        if variant.name != skill.name and not variant.effects:
+            continue  # without the thing that it deals with it does nothing
         name = writer.name(variant.name)
         actions[name] = Action(skill.name, len(skill.parameters))
         blocks.append(_action(writer, name, skill, variant, FACING in used))
@@ -312,7 +314,8 @@ def _decided(variant: _Variant, choice: Choice) -> Iterator[_Variant]:
     for e in variant.effects:
         facts = tuple(f for f in e.facts if name not in f.args)
         copies = tuple(c for c in e.copies if name not in (c.target, c.source))
-        effects.append(Effect(e.variables, without(e.condition, name), facts, copies, e.gone))
+        if facts or copies:
+            effects.append(Effect(e.variables, without(e.condition, name), facts, copies))
     yield _Variant(
         f"{variant.name}__no_{name.removeprefix('?')}",
         variant.parameters,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from forestall.domain.formula import Formula, variables
 from forestall.domain.model import Domain, PredicateKind
-from forestall.domain.pddl_declared import plain, things_of, value_key
+from forestall.domain.pddl_declared import differing, plain, things_of, value_key
 from forestall.domain.pddl_formula import Reader, Value
 from forestall.domain.pddl_text import (
     ROOT,
@@ -86,7 +86,7 @@ def _read(text: str, domain: Domain) -> PddlProblem:
             raise AtLineError(
                 goal.line, f"no action of {domain.name} is about the types of {variable} together"
             )
-    return PddlProblem(name, things, values, facts, wanted, tuple(sorted(spelling.items())))
+    return PddlProblem(name, things, values, facts, wanted, tuple(differing(spelling).items()))
 
 
 def _parts(text: str, domain: Domain) -> tuple[str, dict[str, Group]]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from forestall.errors import InputError, UnknownNameError
 
 _TOKEN = re.compile(r";[^\n]*|[()]|[^\s();]+")
+_TOP = (":action", ":derived", ":goal", ":init", ":predicates")
 _NAME = re.compile(r"\??[a-z_][a-z0-9_]*")
 
 ROOT = "object"
@@ -90,6 +91,9 @@ def parse_pddl(text: str) -> Group:
             else:
                 done = group
         else:
+            if token in _TOP and not stack[-1][1] and len(stack) > 2:
+                text = "the section that begins here is not closed: a parenthesis is missing"
+                raise AtLineError(stack[1][0], text)
             stack[-1][1].append(Word(token.lower(), line))
     if stack:
         raise AtLineError(stack[-1][0], "a parenthesis is opened here and never closed")

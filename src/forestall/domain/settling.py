@@ -7,6 +7,7 @@ each other for ever; two of them are refused where what each brings about lets t
 from __future__ import annotations
 
 from forestall.domain.formula import literals, normal
+from forestall.domain.located import keyed
 from forestall.domain.model import Domain, Process
 from forestall.errors import InputError
 from forestall.types.facts import Literal
@@ -28,11 +29,8 @@ def check_settling(domain: Domain) -> None:
                             if process is other
                             else (f"{process.name} and {other.name}")
                         )
-                        error = InputError(
-                            f"process {both}: never settles: {fact} and {back} follow each other"
-                        )
-                        error.keys = (f"[processes.{process.name}]",)  # type: ignore[attr-defined]
-                        raise error
+                        text = f"process {both}: never settles: {fact} and {back} follow each other"
+                        raise keyed(InputError(text), f"[processes.{process.name}]")
 
 
 def _facts(process: Process) -> list[Literal]:

@@ -85,7 +85,9 @@ class GraphView:
 
     def _may_be_hidden(self, name: str) -> bool:
         node = self._nodes[name]
-        return name not in self._places and (node.seen is not Seen.VISIBLE or node.box_m is None)
+        if name in self._places or self.domain.is_a(node.category, self.domain.roles.fixture):
+            return False
+        return node.seen is not Seen.VISIBLE or node.box_m is None
 
     def value(self, name: str, attribute: str) -> str | None:
         """The observed value of an attribute."""

@@ -88,7 +88,7 @@ def conduct(
         InputError: something that does not fit, each with what would be valid.
     """
     runs = experiment.choice.runs()
-    _check(experiment, runs)
+    check(experiment, runs)
     folder = episodes_in(out, experiment.kind)
     with folder.alone():
         rows = folder.open(experiment.about())
@@ -106,8 +106,12 @@ def conduct(
     return [rows[r.key] for r in runs]
 
 
-def _check(experiment: Experiment, runs: Sequence[Run]) -> None:
-    """See before anything is run that all of it can be."""
+def check(experiment: Experiment, runs: Sequence[Run]) -> None:
+    """See before anything is run that all of it can be.
+
+    Raises:
+        ForestallError: it cannot; says why.
+    """
     if experiment.workers < 1:
         raise InputError(f"--jobs {experiment.workers}: at least 1 is needed")
     if experiment.settings.pages not in PAGES:
@@ -190,4 +194,4 @@ def implied(run: Run, rows: Mapping[str, EpisodeRow]) -> EpisodeRow | None:
     )
 
 
-__all__ = ["Experiment", "conduct", "implied"]
+__all__ = ["Experiment", "check", "conduct", "implied"]

@@ -14,7 +14,7 @@ from typing import Any
 
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.errors import InputError
-from forestall.experiments.conduct import Experiment, Progress, conduct
+from forestall.experiments.conduct import Experiment, Progress, check, conduct
 from forestall.experiments.runs import Run
 from forestall.statistics.cases import UNDISTURBED, Case
 from forestall.statistics.rows import EpisodeRow, Judged
@@ -94,9 +94,10 @@ def folder_for(experiment: Experiment, out: Path | None) -> Path:
     """Where the results go: by default a folder that only the same settings, memory and code share.
 
     Raises:
-        InputError: `out` is a file, or is named like one.
+        InputError: `out` is a file, or is named like one; or what is wanted cannot be run.
     """
     if out is None:
+        check(experiment, experiment.choice.runs())
         return Path("runs") / f"{KIND}-{experiment.about().digest}"
     if out.suffix == ".jsonl" or out.is_file():
         raise InputError(f"--out {out}: give a folder; the lines are in its episodes.jsonl")

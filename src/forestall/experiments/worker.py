@@ -151,9 +151,12 @@ def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace)
         compute_s=dict(record.compute_s),
         reasoning_s=reasoning_s(record.compute_s),
         provenance={
-            k: v
-            for k, v in record.provenance
-            if k in ("config", "demonstrations", "memory", "perception", "versions")
+            **{
+                k: v
+                for k, v in record.provenance
+                if k in ("demonstrations", "memory", "perception", "versions")
+            },
+            "config": prepared.config.to_json(defaulted=False),
         },
     )
 

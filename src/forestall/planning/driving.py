@@ -61,7 +61,9 @@ def _served(state: State, name: str) -> str | None:
             kind = state.kinds[name]
             for first, second in sorted(domain.statics.get(predicate.name, ())):
                 if first == kind and second != kind:
-                    partners = [x for x in state.instances(second) if _holds(state, predicate.name, name, x)]
+                    partners = [
+                        x for x in state.instances(second) if _holds(state, predicate.name, name, x)
+                    ]
                     if partners:
                         return partners[0]
     return None

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
+from forestall.domain.evaluate import TRUE, by_number, solutions
 from forestall.domain.formula import Every, Fewer, Formula, Not, Or, Some, bind, free, normal
 from forestall.domain.model import LOCATED, Choice, Effect, Need, Skill
 from forestall.errors import InputError
@@ -110,12 +110,13 @@ def _meant(state: State, skill: Skill, variable: str, raw: str, names: Mapping[s
         found = tuple(x for x in found if x not in held) or found
     if len(found) == 1:
         return found[0]
+    free = state.asked.schemas.free
     own = [n.formula for n in skill.needs if free(n.formula) <= {variable, *names}]
     own = [f for f in own if variable in free(f)]
 
     def ease(thing: str) -> tuple[list[bool], tuple[str, int]]:
         binding = {**names, variable: thing}
-        return [evaluate(f, state, binding) != TRUE for f in own], by_number(thing)
+        return [not state.true(f, binding) for f in own], by_number(thing)
 
     return min(found, key=ease)
 
@@ -164,7 +165,7 @@ def _run(state: State, skill: Skill, args: tuple[str, ...]) -> None:
     if skill.done_when is not None and state.true(skill.done_when, names):
         return
     for need in skill.needs:
-        if evaluate(need.formula, state, names) != TRUE:
+        if not state.true(need.formula, names):
             raise _refused(state, need, names)
     for variable, pieces in made.items():
         source = names[next(m.source for m in skill.makes if m.variable == variable)]
@@ -203,9 +204,7 @@ def _choose(
     if not state.true(choice.only_if, known):
         return
     for formula in choice.among:
-        several = [
-            b[variable.name] for b, t in solutions((variable,), formula, state, known) if t == TRUE
-        ]
+        several = [b[variable.name] for b in state.bindings((variable,), formula, known)]
         fitting = [x for x in several if state.true(choice.such_that, {**known, variable.name: x})]
         found = sorted(fitting, key=by_number)
         if found:

@@ -15,7 +15,7 @@ from forestall.domain.model import FACING, Choice, Domain, Effect, PredicateKind
 from forestall.planning.execute import mentions
 from forestall.planning.grounder import EXISTS, Grounder, Universe
 from forestall.planning.nodes import Junction, Node, all_of, any_of, negate
-from forestall.planning.schemas import Schemas
+from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
@@ -66,20 +66,14 @@ class _SkillPlan:
 
     def __init__(self, domain: Domain, skill: Skill) -> None:
         self.skill = skill
+        families = [s.family or s.name for s in domain.skills.values()]
+        self.rank = families.index(skill.family or skill.name)
         self.simple = simple_needs(domain, skill)
         self.relational = [e for e in skill.effects if _adds_relation(domain, e)]
         self.stable = not any(
             _asks_relation(domain, e.condition) for e in self.relational
         ) and not (skill.choices or skill.makes)
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
-
-
-def schemas_of(domain: Domain) -> Schemas:
-    """The compiled formulas of a domain, made once and kept with it."""
-    found = domain.__dict__.get("_schemas")
-    if found is None:
-        found = domain.__dict__["_schemas"] = Schemas(domain)
-    return found  # type: ignore[no-any-return]
 
 
 def ground(state: State, universe: Universe) -> Grounding:
@@ -114,6 +108,7 @@ class _Grounding:
                 g.allow(fact)
         self._explore()
         bindings = [(p, b) for p in self.plans for b in self._bindings(p)]
+        bindings.sort(key=self._order)
         for plan, names in bindings:
             for effect in plan.skill.effects:
                 g.maybe.update(names[v] for v in effect.gone if v in names)
@@ -201,7 +196,9 @@ class _Grounding:
         )
 
     def _suited(self, skill: Skill, names: Names) -> bool:
-        return all(self.schemas.formula(f)(self.grounder, names) is not False for f in skill.prefers)
+        return all(
+            self.schemas.formula(f)(self.grounder, names) is not False for f in skill.prefers
+        )
 
     def _made(self, skill: Skill, names: Names) -> dict[str, tuple[str, ...]]:
         found = {}
@@ -210,6 +207,13 @@ class _Grounding:
             if pieces:
                 found[make.variable] = pieces
         return found
+
+    def _order(self, binding: tuple[_SkillPlan, Names]) -> tuple[object, ...]:
+        """Of equal steps the search takes the first: what is put away goes to a support first."""
+        plan, names = binding
+        several = [by_number(x) for x in names.values()]
+        away = any(x in self.universe.supports for x in list(names.values())[-1:])
+        return plan.rank, several[:-1], not away, several
 
     # --- choices ---------------------------------------------------------------------------------
 
@@ -251,10 +255,12 @@ class _Grounding:
             found.append(({}, none, None))
         return found
 
-    def _faced(self, choice: Choice, known: Names, only: Node) -> list[tuple[Names, Node, str | None]]:
+    def _faced(
+        self, choice: Choice, known: Names, only: Node
+    ) -> list[tuple[Names, Node, str | None]]:
         """Things that are chosen once the robot faces them."""
         g, variable = self.grounder, choice.variable.name
-        such = self.schemas.join((choice.variable,), choice.such_that, free(choice.such_that))
+        such = self.schemas.join((choice.variable,), choice.such_that, self.schemas.free(choice.such_that))
         found: list[tuple[Names, Node, str | None]] = []
         for bound, node in such(g, known):
             name = bound[variable]
@@ -286,7 +292,7 @@ class _Grounding:
     def _fitting(self, choice: Choice, formula: Formula, known: Names) -> list[tuple[str, Node]]:
         """Things that a formula and `such_that` are true of, lowest number first."""
         g, variable = self.grounder, choice.variable.name
-        join = self.schemas.join((choice.variable,), formula, free(formula))
+        join = self.schemas.join((choice.variable,), formula, self.schemas.free(formula))
         such = self.schemas.formula(choice.such_that)
         nodes: dict[str, Node] = {}
         for bound, node in join(g, known):
@@ -319,7 +325,7 @@ class _Grounding:
             changes = list(self._changes(skill.effects, bound, made))
             if made:
                 changes += self._births(skill, bound, made)
-            if any(c.condition is True and c.add == [-1] for c in changes):
+            if any(c.condition is True and -1 in c.add for c in changes):
                 continue
             prefers = [
                 part
@@ -365,7 +371,7 @@ class _Grounding:
                     if node is not False:
                         yield effect, known, node
                     continue
-                join = self.schemas.join(effect.variables, effect.condition, free(effect.condition))
+                join = self.schemas.join(effect.variables, effect.condition, self.schemas.free(effect.condition))
                 for bound, node in join(g, known):
                     yield effect, bound, node
 
@@ -397,13 +403,13 @@ class _Grounding:
             self._set(change, atom[1], fact.predicate, fact.value)
         elif known.kind is PredicateKind.HISTORY:
             (change.delete if fact.value == "false" else change.add).append(g.number_of(atom))
-        elif atom in g.possible:
-            if fact.value == "false":
+        elif fact.value == "false":
+            if atom in g.possible:
                 change.delete.append(g.number_of(atom))
-            else:
-                change.add.append(g.number_of(atom))
-                change.delete += g.rivals(atom)
-        elif fact.value == "true":
+        elif atom in g.possible and self._may(atom):
+            change.add.append(g.number_of(atom))
+            change.delete += g.rivals(atom)
+        else:
             change.add.append(-1)
 
     def _set(self, change: Change, name: str, attribute: str, value: str) -> None:
@@ -523,4 +529,3 @@ def _asks_relation(domain: Domain, formula: Formula) -> bool:
 
 def _asks(formulas: Iterable[Formula], predicate: str) -> bool:
     return any(x.predicate == predicate for f in formulas for x, _ in literals(f))
-

@@ -24,9 +24,10 @@ from forestall.domain.formula import (
 )
 from forestall.domain.model import Copy, Domain, Effect, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, Made, makeable
-from forestall.planning.ground import schemas_of, simple_needs
+from forestall.planning.ground import simple_needs
 from forestall.planning.grounder import Grounder, Universe
 from forestall.planning.nodes import Node
+from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
@@ -185,7 +186,7 @@ class _Possible(Grounder):
             if name is not None and parameter.kind and not self.is_a(name, parameter.kind):
                 return
         left = tuple(p for p in schema.parameters if p.name not in names)
-        join = self.schemas.join(left, way.simple, frozenset(names) & free(way.simple))
+        join = self.schemas.join(left, way.simple, frozenset(names) & self.schemas.free(way.simple))
         for bound, _ in join(self, names):
             yield from self._chosen(way, bound)
 
@@ -199,9 +200,9 @@ class _Possible(Grounder):
             for known in several:
                 found: dict[str, None] = {}
                 for formula in choice.among:
-                    needed = free(formula) | free(choice.such_that)
+                    needed = self.schemas.free(formula) | self.schemas.free(choice.such_that)
                     if needed - {variable} <= known.keys():
-                        join = self.schemas.join((choice.variable,), formula, free(formula))
+                        join = self.schemas.join((choice.variable,), formula, self.schemas.free(formula))
                         found.update((b[variable], None) for b, _ in join(self, known))
                         if found and not _asks_state(self.domain, formula):
                             break
@@ -209,12 +210,12 @@ class _Possible(Grounder):
             several = more
         for known in several:
             own = {v.name for v in way.effect.variables}
-            needed = free(way.effect.condition) - own
+            needed = self.schemas.free(way.effect.condition) - own
             if needed <= known.keys():
                 condition = way.effect.condition
                 if own:
                     open_now = tuple(v for v in way.effect.variables if v.name not in known)
-                    bound = frozenset(free(condition)) & frozenset(known)
+                    bound = frozenset(self.schemas.free(condition)) & frozenset(known)
                     join = self.schemas.join(open_now, condition, bound)
                     if any(True for _ in join(self, known)):
                         yield known
@@ -229,11 +230,13 @@ class _Closure:
         self.state, self.domain = state, state.domain
         self.all_made = makeable(state)
         self.world = _Possible(state, self.all_made)
+        self.schemas = self.world.schemas
         self.kept: set[str] = set()
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self.purposeful: set[str] = set()
         self.cleared: set[str] = set()
         self.visited: set[tuple[object, ...]] = set()
+        self._eases: dict[str, tuple[object, ...]] = {}
 
     def keep(self, names: Iterable[str]) -> None:
         """Keep things, with what has them, what blocks them, and what fills a limited place."""
@@ -296,12 +299,12 @@ class _Closure:
 
     def need(self, formula: Formula, names: Names, depth: int, always: bool = False) -> None:
         """Keep what can make a formula true."""
-        if depth > DEPTH or not free(formula) <= names.keys():
+        if depth > DEPTH or not self.schemas.free(formula) <= names.keys():
             return
         if not always and evaluate(formula, self.state, names) == TRUE:
             self._rely(normal(formula), names)
             return
-        self._need(normal(formula), names, depth)
+        self._need(self.schemas.normal(formula), names, depth)
 
     def _rely(self, formula: Formula, names: Names) -> None:
         """Keep by what a formula is true: without its witnesses a narrowed problem denies it."""
@@ -334,27 +337,27 @@ class _Closure:
                 if self.world.schemas.formula(part)(self.world, names) is not False:
                     self.need(part, names, depth)
         elif isinstance(formula, Some):
-            join = self.world.schemas.join(formula.variables, formula.part, free(formula))
+            join = self.world.schemas.join(formula.variables, formula.part, self.schemas.free(formula))
             found = [b for b, _ in join(self.world, names)]
             for bound in self._best(found, {v.name for v in formula.variables}):
                 self.need(formula.part, bound, depth + 1)
         elif isinstance(formula, Every):
-            against = normal(formula.part, False)
+            against = self.schemas.normal(formula.part, False)
             for bound, truth in solutions(formula.variables, against, self.state, names):
                 if truth == TRUE:
                     self.need(formula.part, bound, depth + 1)
         elif isinstance(formula, Fewer):
-            denied = Not(formula.part)
+            denied = self.schemas.normal(formula.part, False)
             for bound, truth in solutions((formula.variable,), formula.part, self.state, names):
                 if truth == TRUE:
-                    self._need(normal(denied), bound, depth + 1)
+                    self._need(denied, bound, depth + 1)
         elif isinstance(formula.part, Literal):
             literal = formula.part.bind(names)
             for value in self.domain.values(literal.predicate):
                 if value != literal.value:
                     self._achieve(Literal(literal.predicate, literal.args, value), depth)
 
-    def _best(self, found: Sequence[Names], new: set[str]) -> list[Names]:
+    def _best(self, found: Sequence[Names], new: set[str], most: int = GROUPS) -> list[Names]:
         """The most promising bindings, one for each combination of categories."""
         groups: dict[tuple[str, ...], list[Names]] = {}
         categories = self.world.categories
@@ -364,14 +367,20 @@ class _Closure:
         best = [min(g, key=lambda b: [self._ease(b[v]) for v in sorted(new) if v in b])
                 for g in groups.values()]  # fmt: skip
         best.sort(key=lambda b: [self._ease(b[v]) for v in sorted(new) if v in b])
-        for bound in best[:GROUPS]:
+        for bound in best[:most]:
             self.keep(bound[v] for v in new if v in bound)
-        return best[:GROUPS]
+        return best[:most]
 
     def _ease(self, name: str) -> tuple[object, ...]:
+        rest = self._eases.get(name)
+        if rest is None:
+            rest = self._eases[name] = self._judged(name)
+        return (rest[0], name not in self.kept, *rest[1:])
+
+    def _judged(self, name: str) -> tuple[object, ...]:
         state, roles = self.state, self.domain.roles
         if name not in state.kinds:
-            return (2, True, True, by_number(name))
+            return (True, True, True, True, by_number(name))
         held = any(h == name for _, h in state.in_hands())
         category = state.kind(name)
         shut_in = roles.accessible is not None and not state.says(roles.accessible, name)
@@ -379,8 +388,7 @@ class _Closure:
         full = bool(category.numbers) and bool(state.contents(name))
         avoided = bool(category.tags & set(roles.avoid))
         fixed = roles.fixture in category.tags
-        rank = 0 if held or name in self.kept else 1
-        return (avoided, rank, not fixed, shut_in or blocked or full, by_number(name))
+        return (avoided, not held, not fixed, shut_in or blocked or full, by_number(name))
 
     def _achieve(self, literal: Literal, depth: int) -> None:
         key = (literal.predicate, *literal.args, literal.value)
@@ -393,7 +401,7 @@ class _Closure:
         if known.kind is PredicateKind.DERIVED:
             assert known.definition is not None
             names = {p.name: a for p, a in zip(known.parameters, literal.args, strict=True)}
-            definition = known.definition if literal.value != "false" else Not(known.definition)
+            definition = self.schemas.normal(known.definition, literal.value != "false")
             self.need(definition, names, depth)
             return
         if literal.value == "false":
@@ -408,12 +416,6 @@ class _Closure:
 
     def _follow(self, way: _Way, atom: tuple[str, ...], literal: Literal, depth: int) -> None:
         bound = set(way.what.args) if isinstance(way.what, Literal) else {way.what.target}
-        found = list(self.world.bindings(way, atom))
-        if isinstance(way.what, Copy):
-            copy = way.what
-            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
-            movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
-            found = having if having or movable else found
         new = {p.name for p in way.schema.parameters if p.name not in bound}
         conditions = [way.effect.condition] if not way.effect.variables else []
         if isinstance(way.schema, Process):
@@ -421,8 +423,17 @@ class _Closure:
         else:
             conditions += [n.formula for n in way.schema.needs]
             new |= {c.variable.name for c in way.schema.choices}
-        for binding in self._best(found, new):
-            hand = way.schema.hand if isinstance(way.schema, Skill) else None
+        found = list(self.world.bindings(way, atom))
+        if isinstance(way.what, Copy):
+            copy = way.what
+            if _denied(conditions, copy, literal.value):
+                return
+            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
+            movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
+            found = having if having or movable else found
+        hand = way.schema.hand if isinstance(way.schema, Skill) else None
+        most = GROUPS if isinstance(way.schema, Process) or hand in new else 1
+        for binding in self._best(found, new, most):
             for variable in new & binding.keys():
                 if variable == hand or isinstance(way.schema, Process):
                     self.use(binding[variable])
@@ -449,6 +460,12 @@ class _Closure:
                 return
         for way in self.world.ways.get(f"not {literal.predicate}", ()):
             self._follow(way, (literal.predicate, *literal.args), literal, depth)
+
+
+def _denied(conditions: Sequence[Formula], copy: Copy, value: str) -> bool:
+    """Whether a skill that copies a value asks that the source does not have it."""
+    banned = Literal(copy.attribute, (copy.source,), value)
+    return any(isinstance(f, Not) and f.part == banned for f in conditions)
 
 
 def _ways(domain: Domain) -> dict[str, list[_Way]]:

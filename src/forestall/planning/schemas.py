@@ -84,17 +84,32 @@ class Schemas:
 
     def __init__(self, domain: Domain) -> None:
         self.domain = domain
-        self._formulas: dict[tuple[int, frozenset[str]], tuple[Formula, Ground]] = {}
+        self._formulas: dict[int, tuple[Formula, Ground]] = {}
+        self._free: dict[int, tuple[Formula, frozenset[str]]] = {}
+        self._normal: dict[tuple[int, bool], tuple[Formula, Formula]] = {}
         self._joins: dict[object, tuple[Formula, Join]] = {}
 
-    def formula(self, formula: Formula, bound: frozenset[str] | None = None) -> Ground:
-        """The function that grounds a formula whose free variables are bound."""
-        bound = free(formula) if bound is None else bound
-        key = (id(formula), bound)
-        found = self._formulas.get(key)
+    def normal(self, formula: Formula, positive: bool = True) -> Formula:
+        """The negation normal form, made once."""
+        key = (id(formula), positive)
+        found = self._normal.get(key)
         if found is None or found[0] is not formula:
-            found = (formula, self._compile(normal(formula), bound))
-            self._formulas[key] = found
+            found = self._normal[key] = (formula, normal(formula, positive))
+        return found[1]
+
+    def formula(self, formula: Formula) -> Ground:
+        """The function that grounds a formula whose free variables are bound."""
+        found = self._formulas.get(id(formula))
+        if found is None or found[0] is not formula:
+            found = (formula, self._compile(normal(formula), free(formula)))
+            self._formulas[id(formula)] = found
+        return found[1]
+
+    def free(self, formula: Formula) -> frozenset[str]:
+        """The free variables of a formula."""
+        found = self._free.get(id(formula))
+        if found is None or found[0] is not formula:
+            found = self._free[id(formula)] = (formula, free(formula))
         return found[1]
 
     def join(
@@ -217,9 +232,7 @@ class Schemas:
             steps.append((variable.name, source, variable.kind, checks))
         return _joined(before, steps)
 
-    def _source(
-        self, part: Formula, variable: str, unbound: set[str]
-    ) -> tuple[int, Source] | None:
+    def _source(self, part: Formula, variable: str, unbound: set[str]) -> tuple[int, Source] | None:
         """Where the things come from for which a part can be true."""
         if isinstance(part, Or):
             several = [self._source(p, variable, unbound) for p in part.parts]
@@ -245,7 +258,9 @@ class Schemas:
         if others or args.count(variable) > 1:
             return None
         if kind is PredicateKind.RELATION:
-            return 1, lambda w, n: w.related(predicate, position, tuple([n.get(a, a) for a in args]))
+            return 1, lambda w, n: w.related(
+                predicate, position, tuple([n.get(a, a) for a in args])
+            )
         if kind is PredicateKind.STATIC:
             return 2, lambda w, n: w.static_related(
                 predicate, position, tuple([n.get(a, a) for a in args])
@@ -261,6 +276,14 @@ class Schemas:
         if predicate in (SAME, SAME_CATEGORY, LOCATED, FACING):
             return None
         return 4, _kind(predicate)
+
+
+def schemas_of(domain: Domain) -> Schemas:
+    """The compiled formulas of a domain, made once and kept with it."""
+    found = domain.__dict__.get("_schemas")
+    if found is None:
+        found = domain.__dict__["_schemas"] = Schemas(domain)
+    return found  # type: ignore[no-any-return]
 
 
 def bound_here(bound: frozenset[str], variables: Iterable[Parameter]) -> frozenset[str]:

@@ -5,10 +5,10 @@ Called by `execute`, and by `validate` on a state that was just observed; calls 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
-from forestall.domain.evaluate import TRUE, evaluate, solutions
-from forestall.domain.model import Effect
+from forestall.domain.formula import Formula, literals
+from forestall.domain.model import Domain, Effect
 from forestall.errors import DomainError
 from forestall.planning.state import State
 from forestall.types.facts import Literal
@@ -18,38 +18,65 @@ ROUNDS = 50
 
 
 def settle(state: State) -> None:
-    """Let every process work until nothing changes.
+    """Let every process work until nothing changes; only what has changed since is looked at.
 
     Raises:
         DomainError: the processes never come to an end.
     """
+    domain = state.domain
+    watched = watched_by(domain)
+    changed = set(state.changed)
+    state.changed.clear()
     for _ in range(ROUNDS):
-        before = dict(state.values), set(state.facts)
-        for process in state.domain.processes:
-            found = [
-                b
-                for b, t in solutions(process.parameters, process.condition, state, {})
-                if t == TRUE
-            ]
-            for binding in found:
-                change(state, process.effects, binding)
-        if (state.values, state.facts) == before:
+        again: set[str] = set()
+        for process, about in zip(domain.processes, watched, strict=True):
+            if not changed.isdisjoint(about) or not again.isdisjoint(about):
+                for binding in list(state.bindings(process.parameters, process.condition, {})):
+                    change(state, process.effects, binding)
+                again |= state.changed
+                state.changed.clear()
+        if not again:
             return
+        changed = again
     names = ", ".join(p.name for p in state.domain.processes)
     raise DomainError(f"the processes of {state.domain.name} never settle here ({names})")
 
 
-def change(state: State, effects: Iterable[Effect], names: Mapping[str, str]) -> None:
+def watched_by(domain: Domain) -> list[frozenset[str]]:
+    """For each process the predicates on which its condition and those of its effects depend."""
+    found = domain.__dict__.get("_watched")
+    if found is None:
+        found = [
+            _predicates(domain, [p.condition, *(e.condition for e in p.effects)])
+            for p in domain.processes
+        ]
+        domain.__dict__["_watched"] = found
+    return found  # type: ignore[no-any-return]
+
+
+def _predicates(domain: Domain, formulas: list[Formula]) -> frozenset[str]:
+    names: set[str] = set()
+    waiting = list(formulas)
+    while waiting:
+        for literal, _ in literals(waiting.pop()):
+            if literal.predicate not in names:
+                names.add(literal.predicate)
+                known = domain.derived.get(literal.predicate)
+                if known is not None and known.definition is not None:
+                    waiting.append(known.definition)
+    return frozenset(names)
+
+
+def change(state: State, effects: Iterable[Effect], names: dict[str, str]) -> None:
     """Let effects happen; every condition is judged on the state before any of them."""
     add: list[Literal] = []
     copies: list[tuple[str, str, str]] = []
     gone: list[str] = []
     for effect in effects:
-        if not effect.variables:
-            found = [names] if evaluate(effect.condition, state, names) == TRUE else []
+        if effect.variables:
+            found = list(state.bindings(effect.variables, effect.condition, names))
         else:
-            solved = solutions(effect.variables, effect.condition, state, names)
-            found = [{**names, **b} for b, t in solved if t == TRUE]
+            found = [names] if state.true(effect.condition, names) else []
         for binding in found:
             add += [f.bind(binding) for f in effect.facts]
             gone += [binding[g] for g in effect.gone]

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from forestall.domain.evaluate import TRUE, by_number, evaluate, literal_truth, number_of
-from forestall.domain.formula import Formula
+from forestall.domain.evaluate import TRUE, by_number, literal_truth, number_of
+from forestall.domain.formula import Formula, Parameter
 from forestall.domain.model import FACING, LOCATED, Category, Domain, PredicateKind
+from forestall.planning.asked import Asked
 from forestall.types.facts import Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
 
@@ -50,8 +51,8 @@ class State:
     """
 
     __slots__ = (
-        "_index", "_kind_index", "assumed", "at", "crowded", "domain", "facts", "hidden", "kinds",
-        "lost", "values",
+        "_asked", "_index", "_kind_index", "assumed", "at", "changed", "crowded", "domain", "facts",
+        "hidden", "kinds", "lost", "values",
     )  # fmt: skip
 
     def __init__(
@@ -69,7 +70,9 @@ class State:
         self.domain, self.kinds = domain, kinds
         self.values = {} if values is None else values
         self.facts: set[Fact] = set()
-        self._index: dict[tuple[str, int, str], set[Fact]] = {}
+        self._index: dict[tuple[str, int, str], frozenset[Fact]] = {}
+        self.changed: set[str] = set(domain.predicates)
+        self._asked: Asked | None = None
         self._kind_index: dict[str, tuple[str, ...]] = {}
         for fact in facts:
             self.add(fact)
@@ -121,7 +124,8 @@ class State:
         other = State.__new__(State)
         other.domain, other.kinds, other.values = self.domain, dict(self.kinds), dict(self.values)
         other.facts = set(self.facts)
-        other._index = {k: set(v) for k, v in self._index.items()}
+        other._index = dict(self._index)
+        other.changed, other._asked = set(self.changed), None
         other._kind_index = self._kind_index
         other.at, other.lost, other.hidden = self.at, self.lost, self.hidden
         other.crowded, other.assumed = self.crowded, self.assumed
@@ -140,18 +144,23 @@ class State:
                     for old in tuple(self._index.get((name, 0, fact[1]), ())):
                         self.remove(old)
         self.facts.add(fact)
+        self.changed.add(fact[0])
         for position, arg in enumerate(fact[1:]):
-            self._index.setdefault((fact[0], position, arg), set()).add(fact)
+            key = (fact[0], position, arg)
+            self._index[key] = self._index.get(key, frozenset()) | {fact}
 
     def remove(self, fact: Fact) -> None:
         """Let a fact end."""
         if fact not in self.facts:
             return
         self.facts.discard(fact)
+        self.changed.add(fact[0])
         for position, arg in enumerate(fact[1:]):
             key = (fact[0], position, arg)
-            self._index[key].discard(fact)
-            if not self._index[key]:
+            left = self._index[key] - {fact}
+            if left:
+                self._index[key] = left
+            else:
                 del self._index[key]
 
     def set_value(self, name: str, attribute: str, value: str) -> None:
@@ -159,7 +168,9 @@ class State:
         old = self.values.get((name, attribute))
         if old is None:
             return
-        self.values[name, attribute] = value
+        if old != value:
+            self.values[name, attribute] = value
+            self.changed.add(attribute)
         if self.assumed:
             self.assumed -= {Literal(attribute, (name,), old)}
 
@@ -169,6 +180,7 @@ class State:
         self._kind_index = {}
         for attribute, value in self.domain.default_states(category).items():
             self.values[name, attribute] = value
+        self.changed.update(self.domain.predicates)
 
     def take_away(self, name: str) -> None:
         """A thing is no more; histories of it stay."""
@@ -190,7 +202,7 @@ class State:
         """The category name of a thing, that of its name for what does not exist."""
         return self.kinds.get(name) or self.domain.canonical(category_of(name))
 
-    def of_kind(self, kind: str) -> Iterable[str]:
+    def of_kind(self, kind: str) -> tuple[str, ...]:
         """Things that count as a tag, a category or an attribute holder."""
         found = self._kind_index.get(kind)
         if found is None:
@@ -215,14 +227,18 @@ class State:
         """Nothing is unsure here."""
         return False
 
-    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Iterable[str]:
+    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> list[str]:
         """What stands at a position of a relation, the rest being given."""
         if len(args) == 1:
             return [f[1] for f in self.facts if f[0] == predicate]
         given = next((i for i, a in enumerate(args) if i != position and a[0] != "?"), None)
         if given is None:  # p(?x, ?x)
             return sorted({f[1] for f in self.facts if f[0] == predicate and len({*f[1:]}) == 1})
-        found = self._index.get((predicate, given, args[given]), ())
+        found = self._index.get((predicate, given, args[given]))
+        if not found:
+            return []
+        if len(args) == 2:
+            return sorted([f[position + 1] for f in found])
         return sorted(
             {
                 f[position + 1]
@@ -245,11 +261,33 @@ class State:
 
     def true(self, formula: Formula, names: dict[str, str] | None = None) -> bool:
         """Whether a formula holds under a binding of its variables."""
-        return evaluate(formula, self, names or {}) == TRUE
+        asked = self.asked
+        return asked.schemas.formula(formula)(asked, names or {}) is True
+
+    def bindings(
+        self, variables: tuple[Parameter, ...], formula: Formula, names: dict[str, str]
+    ) -> Iterator[dict[str, str]]:
+        """Every binding of variables under which a formula holds."""
+        asked = self.asked
+        join = asked.schemas.join(variables, formula, frozenset(names))
+        return (b for b, node in join(asked, names) if node is True)
+
+    @property
+    def asked(self) -> Asked:
+        """The state as what compiled formulas ask."""
+        if self._asked is None:
+            self._asked = Asked(self)
+        return self._asked
 
     def says(self, predicate: str | None, *args: str) -> bool:
         """Whether a fact holds, derived ones too; False for a role that the domain lacks."""
-        return predicate is not None and literal_truth(Literal(predicate, args), self, {}) == TRUE
+        if predicate is None:
+            return False
+        asked = self.asked
+        known = self.domain.predicates.get(predicate)
+        if known is not None and known.kind is PredicateKind.DERIVED:
+            return asked.derived(predicate, args) is True
+        return literal_truth(Literal(predicate, args), self, {}) == TRUE
 
     @property
     def held(self) -> str | None:

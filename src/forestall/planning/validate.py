@@ -14,7 +14,7 @@ from forestall.domain.model import LOCATED, Domain
 from forestall.planning.execute import Refusal, apply, resolve
 from forestall.planning.settle import settle
 from forestall.planning.state import State, decided
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Goal
@@ -126,16 +126,19 @@ def bindings(state: State, goal: Goal) -> Iterator[dict[str, str]]:
 def as_checked(plan: Plan, check: PlanCheck, state: State) -> Plan:
     """The plan to send: with the instances that it was checked with.
 
-    A category stays for a support of which any will do, and for what the state does not have yet.
+    A category stays for a support of which any will do, for what the state does not have yet, and
+    where something else stands in for it.
     """
     if check.plan is None:
         return plan
     domain, steps = state.domain, []
+
+    def sent(given: str, meant: str) -> str:
+        same = domain.canonical(category_of(given)) == state.kinds.get(meant)
+        return meant if same and not domain.is_a(given, domain.roles.support) else given
+
     for step, meant in zip(plan.subtasks, check.plan.subtasks, strict=True):
-        args = tuple(
-            m if m in state.kinds and not (n != m and domain.is_a(n, domain.roles.support)) else n
-            for n, m in zip(step.args, meant.args, strict=True)
-        )
+        args = tuple(map(sent, step.args, meant.args))
         steps.append(Subtask(step.skill, args))
     return Plan(tuple(steps), plan.goal)
 

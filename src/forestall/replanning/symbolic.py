@@ -203,7 +203,9 @@ class PlannerReplanner:
 def _hand(state: State, wanted: Sequence[Literal]) -> list[Literal]:
     """What the hands hold, and what lies in or on that, should stay so."""
     roles = state.domain.roles
-    if roles.holding is None or any(x.predicate in (roles.holding, roles.hand_empty) for x in wanted):
+    if roles.holding is None or any(
+        x.predicate in (roles.holding, roles.hand_empty) for x in wanted
+    ):
         return []
     held = list(state.in_hands())
     if not held:

@@ -2,7 +2,7 @@
 
 A listener: it is told what happens and cannot change it. It executes the plan at hand on the true
 state in the planning domain; the upper bound that no detector can beat, and the earliest moment at
-which a failure exists. Built by `build` with the oracle, read by the experiments.
+which a failure exists. Built by `assembly` with the oracle, read by the experiments.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class TruthTrace:
         self._succeeded = True
 
     def attach(self, oracle: OracleView, domain: Domain) -> None:
-        """Say whose truth is meant; `build` does."""
+        """Say whose truth is meant; `assembly` does."""
         validator = GraphValidator(domain)
 
         def look(context: BoundaryContext) -> TrueMoment:

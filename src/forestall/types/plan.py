@@ -37,7 +37,9 @@ class Subtask:
 
 def same_step(a: Subtask, b: Subtask) -> bool:
     """Whether two subtasks are the same up to naming an instance or only its category."""
-    return a.skill == b.skill and all(
+    if a.skill != b.skill or len(a.args) != len(b.args):
+        return False
+    return all(
         x == y
         or (category_of(x) == category_of(y) and (x == category_of(x) or y == category_of(y)))
         for x, y in zip(a.args, b.args, strict=True)

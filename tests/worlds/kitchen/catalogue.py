@@ -14,7 +14,7 @@ from typing import Any
 from mutants import Mutant
 
 from forestall.domain.model import Domain
-from forestall.vocabulary import Category, Domain, Receptacle
+from forestall.worlds.kitchen.catalogue import Catalogue, Category, Receptacle, shipped_catalogue
 from forestall.worlds.kitchen.skills import KNIFE
 
 
@@ -82,23 +82,7 @@ def differences(domain: Domain, vocabulary: Domain) -> Iterator[str]:
     if set(domain.tags) != set(TAGS):
         yield f"tags: {set(domain.tags) ^ set(TAGS)}"
     for name, theirs in vocabulary.categories.items():
-        ours = domain.categories[name]
-        shape = _shape(theirs)
-        numbers = {"capacity": shape.capacity, "slices": theirs.slices_into and theirs.slices}
-        expected = {
-            "attributes": set(theirs.attributes),
-            "aliases": set(theirs.aliases),
-            "words": theirs.words,
-            "synonyms": theirs.synonyms,
-            "tags": {t for t, holds in TAGS.items() if holds(theirs)},
-            "numbers": {k: v for k, v in numbers.items() if v is not None},
-        }
-        for field, value in expected.items():
-            said = getattr(ours, field)
-            said = dict(said) if isinstance(value, dict) else said
-            said = set(said) if isinstance(value, set) else said
-            if said != value:
-                yield f"{name}: {field} {said}, the catalogue has {value}"
+        yield from _of_category(domain, name, theirs)
         if domain.default_states(name) != vocabulary.default_states(name):
             yield f"{name}: defaults {domain.default_states(name)}"
     for attribute, known in vocabulary.attributes.items():
@@ -114,6 +98,26 @@ def differences(domain: Domain, vocabulary: Domain) -> Iterator[str]:
             yield f"{predicate}: {set(domain.statics.get(predicate, ())) ^ pairs}"
     if set(domain.statics) != set(_pairs(vocabulary)):
         yield f"static predicates: {set(domain.statics) ^ set(_pairs(vocabulary))}"
+
+
+def _of_category(domain: Domain, name: str, theirs: Category) -> Iterator[str]:
+    ours = domain.categories[name]
+    shape = _shape(theirs)
+    numbers = {"capacity": shape.capacity, "slices": theirs.slices_into and theirs.slices}
+    expected = {
+        "attributes": set(theirs.attributes),
+        "aliases": set(theirs.aliases),
+        "words": theirs.words,
+        "synonyms": theirs.synonyms,
+        "tags": {t for t, holds in TAGS.items() if holds(theirs)},
+        "numbers": {k: v for k, v in numbers.items() if v is not None},
+    }
+    for field, value in expected.items():
+        said = getattr(ours, field)
+        said = dict(said) if isinstance(value, dict) else said
+        said = set(said) if isinstance(value, set) else said
+        if said != value:
+            yield f"{name}: {field} {said}, the catalogue has {value}"
 
 
 def lacking(domain: Domain) -> Iterator[Mutant]:

@@ -4,10 +4,11 @@
         [SECONDS] [SEED] [parts] [smallest]
 
 Random starts and random subtasks, inclined towards what can be executed. An episode is kept, up to
-its last useful step, where it covers a case that no other does or (with "mutants") kills a mutant that
-survived; with "smallest" those that later ones make needless are left out in the end.
-What is in the corpus already stays. Stops with the episode in hand where the kitchen and the domain
-file disagree.
+its last useful step, where it covers a case that no other does or kills a mutant that survived (one
+that lacks a whole need, effect or process; with "parts" one that lacks a part of it, too). With
+"smallest" the episodes that later ones make needless are left out in the end; episodes may also be
+written by hand. What is in the corpus already stays. Stops with the episode in hand where the
+kitchen and the domain file disagree.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
-from covering import CORPUS, Coverage, Episode, Run, Step, fixed, load_corpus, play
+from covering import Coverage, fixed, play
+from covering_play import CORPUS, Episode, Run, Step, load_corpus
 from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 
@@ -33,15 +35,16 @@ from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 
 THINGS = (
-    "Mug-1", "Mug-2", "Cup-1", "Bowl-1", "Bowl-2", "Plate-1", "Plate-2", "Pot-1", "Pan-1", "Kettle-1",
-    "WineBottle-1", "HousePlant-1", "Potato-1", "Tomato-1", "Lettuce-1", "Apple-1", "Bread-1",
-    "Egg-1", "Egg-2", "EggCracked-7", "PotatoSliced-7", "TomatoSliced-7", "BreadSliced-7",
-    "BreadSliced-8", "Knife-1", "Book-1", "CellPhone-1", "RemoteControl-1", "Laptop-1",
+    "Mug-1", "Mug-2", "Cup-1", "Bowl-1", "Bowl-2", "Plate-1", "Plate-2", "Pot-1", "Pan-1",
+    "Kettle-1", "WineBottle-1", "HousePlant-1", "Potato-1", "Tomato-1", "Lettuce-1", "Apple-1",
+    "Bread-1", "Egg-1", "Egg-2", "EggCracked-7", "PotatoSliced-7", "TomatoSliced-7",
+    "BreadSliced-7", "BreadSliced-8", "Knife-1", "Book-1", "CellPhone-1", "RemoteControl-1",
+    "Laptop-1",
 )  # fmt: skip
 FIXTURES = (
-    "CounterTop-1", "CounterTop-2", "DiningTable-1", "Sink-1", "Faucet-1", "Fridge-1", "Microwave-1",
-    "CoffeeMachine-1", "Toaster-1", "StoveBurner-1", "StoveBurner-2", "Cabinet-1", "TVStand-1",
-    "Floor-1", "Drawer-1", "GarbageCan-1", "Shelf-1",
+    "CounterTop-1", "CounterTop-2", "DiningTable-1", "Sink-1", "Faucet-1", "Fridge-1",
+    "Microwave-1", "CoffeeMachine-1", "Toaster-1", "StoveBurner-1", "StoveBurner-2",
+    "Cabinet-1", "TVStand-1", "Floor-1", "Drawer-1", "GarbageCan-1", "Shelf-1",
 )  # fmt: skip
 MORE_FIXTURES = ("Drawer-1", "GarbageCan-1", "Shelf-1")
 SOMETIMES = ("Sink-2", "Faucet-2", "Faucet-3", "StoveKnob-7", "Fridge-2")
@@ -75,8 +78,8 @@ def start(rng: np.random.Generator, vocabulary: Domain) -> Episode:
         ),
     ]  # fmt: skip
     blocked: dict[str, str] = {}
-    for name in written:
-        others = [o for o in written if o != name and written[o] == written[name]]
+    for name, place in written.items():
+        others = [o for o, other in written.items() if o != name and other == place]
         if others and rng.random() < 0.15:
             blocked[name] = _any(rng, others)
     return Episode(tuple(shown), blocked)
@@ -210,7 +213,7 @@ def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> lis
                 done.append(run.do(chosen))
             if done[-1].differences:
                 steps = tuple(str(s.subtask) for s in done)
-                print(json.dumps(asdict(Episode(run.episode.things, run.episode.blocked, steps))))
+                _say(json.dumps(asdict(Episode(run.episode.things, run.episode.blocked, steps))))
                 write(corpus)
                 raise SystemExit("\n".join(done[-1].differences))
             useful = len(done) if len(coverage.open) < before else useful
@@ -221,10 +224,14 @@ def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> lis
             corpus.append(Episode(run.episode.things, run.episode.blocked, steps))
         if time.monotonic() - said > 10:
             said = time.monotonic()
-            print(f"{len(corpus)} episodes, {len(coverage.open)} cases, {len(left)} mutants left")
-            sys.stdout.flush()
-    print("\n".join(["not covered:", *sorted(coverage.open), "alive:", *(str(m) for m in left)]))
+            _say(f"{len(corpus)} episodes, {len(coverage.open)} cases, {len(left)} mutants left")
+    _say("\n".join(["not covered:", *sorted(coverage.open), "alive:", *(str(m) for m in left)]))
     return corpus
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 def _worth(steps: list[Step], left: list[Mutant]) -> tuple[int, list[Mutant]]:

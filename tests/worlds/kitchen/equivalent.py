@@ -2,7 +2,8 @@
 
 `UNREACHABLE`: cases of `covering.cases` for which there is no situation; a test fails where one is
 reached after all, or where the domain no longer has it. `EQUIVALENT`: mutants of `mutants.mutants`
-that behave like the whole domain. Keys are patterns over names; the first that fits gives the reason.
+that behave like the whole domain. Keys are patterns over names; the first that fits gives the
+reason.
 """
 
 from __future__ import annotations
@@ -62,10 +63,12 @@ UNREACHABLE: dict[str, str] = {
 EQUIVALENT: dict[str, str] = {
     r".*: need \d+ \[located\(.*": _LOST,
     r"put_(in|on): need 5 \[not within.*": _NESTED,
+    r"pick_up: effect 2: not blocking\(\?y, \?object\)":
+        "nothing stands in front of what can be picked up",
     r"(crack|slice)_obj: effect (6|7)( .*|:.*)?": _LIQUID,
     r"crack_obj: effect (4|8|12|16)(:.*)?": _FRESH,
     r"crack_obj: effect (14|15)(:.*)?": _LIQUID,
-}
+}  # fmt: skip
 
 
 def why_equivalent(name: str) -> str | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from covering import Step, belief, unsettled
+from covering_play import Step, belief, unsettled
 
 from forestall.domain.formula import (
     TRUE,
@@ -187,7 +187,8 @@ def _of_skill(skill: Skill) -> Iterator[tuple[str, str, Skill, bool]]:
         others = (*skill.choices[:i], *skill.choices[i + 1 :])
         for what, less_choice in _choices(choice):
             several = (*skill.choices[:i], less_choice, *skill.choices[i + 1 :])
-            yield f"choice {what}", "part", replace(skill, choices=several), False
+            facing = choice.variable.name == skill.at
+            yield f"choice {what}", "part", replace(skill, choices=several), facing
     if skill.done_when is not None:
         yield "done_when", "part", replace(skill, done_when=None), False
         for what, formula in lessened(skill.done_when):

@@ -20,7 +20,8 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from catalogue import differences, lacking
-from covering import Step, load_corpus, play
+from covering import play
+from covering_play import Step, load_corpus
 from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 
@@ -45,9 +46,9 @@ def main() -> int:
     alive = survivors(rules, played(domain))
     alive += [str(m) for m in facts if not any(True for _ in differences(m.domain, catalogue))]
     total = len(rules) + len(facts)
-    print(f"{total} mutants, {total - len(alive)} killed, {len(alive)} alive")
-    for name in sorted(alive):
-        print(f"{name}: {why_equivalent(name) or 'ALIVE'}")
+    lines = [f"{total} mutants, {total - len(alive)} killed, {len(alive)} alive"]
+    lines += [f"{name}: {why_equivalent(name) or 'ALIVE'}" for name in sorted(alive)]
+    sys.stdout.write("\n".join(lines) + "\n")
     return int(any(why_equivalent(name) is None for name in alive))
 
 

@@ -10,7 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 from catalogue import TAGS, differences, lacking
-from covering import Coverage, Run, Step, cases, load_corpus, play
+from covering import Coverage, cases, play
+from covering_play import Run, Step, load_corpus
 from covering_search import geometric, intended, start
 from equivalent import EQUIVALENT, UNREACHABLE, why_equivalent
 from mutants import mutants

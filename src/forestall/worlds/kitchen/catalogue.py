@@ -228,14 +228,12 @@ def catalogue(domain: Domain) -> Catalogue:
         if known is None:
             categories[name] = _added(domain, described)
             continue
-        more = tuple(a for a in described.attributes if a not in known.attributes)
-        defaults = tuple((a, v) for a, v in described.defaults if a in more)
-        if more:
-            categories[name] = replace(
-                known,
-                attributes=(*known.attributes, *more),
-                defaults=tuple(sorted((*known.defaults, *defaults))),
-            )
+        categories[name] = _more(known, described, _added(domain, described))
+    found = Catalogue(categories, attributes, own.own)
+    for place, thing in sorted(domain.statics.get("accepts", ())):
+        if not found.accepts(place, thing):
+            fits = (*categories[thing].fits, place)
+            categories[thing] = replace(categories[thing], fits=fits)
     return Catalogue(categories, attributes, own.own)
 
 
@@ -254,6 +252,29 @@ def _category(name: str, table: Mapping[str, Any]) -> Category:
 
 def _tuples(table: Mapping[str, Any]) -> dict[str, Any]:
     return {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+
+
+def _more(known: Category, described: Described, told: Category) -> Category:
+    """A category of the kitchen with what a task file added to its description."""
+    flags = ("pickupable", "fixture", "food", "soaks", "drains", "fragile")
+    numbers, receptacle = dict(described.numbers), known.receptacle or told.receptacle
+    if receptacle is not None and "capacity" in numbers:
+        receptacle = replace(receptacle, capacity=numbers["capacity"])
+    own = {"shape"} & described.extra.keys() or described.size_m != _size(known)
+    return replace(
+        known,
+        **{f: getattr(known, f) or getattr(told, f) for f in flags},
+        attributes=tuple(dict.fromkeys((*known.attributes, *told.attributes))),
+        defaults=tuple(sorted((dict(known.defaults) | dict(told.defaults)).items())),
+        aliases=tuple(dict.fromkeys((*known.aliases, *told.aliases))),
+        receptacle=receptacle,
+        slices=numbers.get("slices", known.slices),
+        shape={**known.shape, **told.shape} if own else known.shape,
+    )
+
+
+def _size(known: Category) -> tuple[float, ...]:
+    return tuple(known.shape.get("size_m", ()))
 
 
 def _added(domain: Domain, described: Described) -> Category:
@@ -308,7 +329,7 @@ def _device(tags: frozenset[str], related: Callable[[str], tuple[str, ...]]) -> 
         "needs_closed",
         "shut_while_on",
     )
-    if not tags & {*works, "runs_water"}:
+    if not tags & {*works, "runs_water", "remote_controlled"}:
         return None
     flags: dict[str, Any] = {work: work in tags for work in works}
     return Device(
@@ -316,5 +337,6 @@ def _device(tags: frozenset[str], related: Callable[[str], tuple[str, ...]]) -> 
         fills="water" if "runs_water" in tags else "coffee" if "brews" in tags else None,
         cooks_not=related("only_warms"),
         always="cools" in tags,
+        needs_held="RemoteControl" if "remote_controlled" in tags else None,
         **flags,
     )

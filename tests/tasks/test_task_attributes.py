@@ -18,7 +18,8 @@ from forestall.perception.given import GivenStateEstimator
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks
-from forestall.planning.domain import State, apply
+from forestall.planning.execute import apply
+from forestall.planning.state import State
 from forestall.planning.validate import GraphValidator
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.demonstration import Demonstration
@@ -123,7 +124,7 @@ def test_perception_carries_it_and_the_score_counts_it(loaded: LoadedTask) -> No
     assert tomato is not None
     assert tomato.state("ripe") == "ripe"
     assert tomato.state("sliced") is None
-    scorer = BatchScorer(ScoreConfig(), HashedTextEncoder())
+    scorer = BatchScorer(ScoreConfig(), HashedTextEncoder(), loaded.domain)
     same, other = scorer.scores(ripe, [seen(loaded, ripe="ripe"), unripe])
     assert same.score == pytest.approx(1.0)
     assert other.score < 0.9
@@ -174,8 +175,7 @@ def test_the_household_keeps_it(loaded: LoadedTask) -> None:
     tomato = kitchen.oracle.truth().get("Tomato-1")
     assert tomato is not None
     assert tomato.state("heavy") == "light"
-    hidden = [a.name for a in loaded.domain.attributes.values() if not a.camera]
-    estimator = OracleStateEstimator(kitchen.oracle.states, not_visible=hidden)
+    estimator = OracleStateEstimator(kitchen.oracle.states, loaded.domain)
     mask = np.ones((20, 20), dtype=np.bool_)
     frame = kitchen.observe().frames[0]
     (told,) = estimator.estimate(frame, [Detection("Tomato", mask, "Tomato-1")])

@@ -1,0 +1,131 @@
+"""`forestall domain`: list, show, check and export what a robot's world is described by."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import App, Parameter
+
+if TYPE_CHECKING:
+    from forestall.domain.model import Domain
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Flag = Annotated[bool, Parameter(negative="")]
+
+domain = App(name="domain", help="List, show, check and export domains.")
+
+
+@domain.command(name="list")
+def list_(*, as_json: Json = False) -> int:
+    """List the domains that come with the project.
+
+    Args:
+        as_json: print them as JSON.
+    """
+    from forestall.cli.listing import print_table
+    from forestall.domain.load import shipped, shipped_names
+
+    rows = [{"name": n, **_counts(shipped(n))} for n in shipped_names()]
+    if as_json:
+        print(json.dumps(rows, indent=2))
+        return 0
+    header = ("domain", *(k.replace("_", " ") for k in rows[0] if k != "name")) if rows else ()
+    print_table(header, [tuple(str(v) for v in row.values()) for row in rows])
+    return 0
+
+
+@domain.command
+def show(name: str, /) -> int:
+    """Say what is in a domain: its categories, what can be said of things, and its skills.
+
+    Args:
+        name: of a domain that comes with the project, or a TOML or PDDL file.
+    """
+    from forestall.domain.load import load_domain
+    from forestall.domain.sheet import skill_sheet
+
+    found = load_domain(name)
+    print(f"{found.name}: {_sentence(found)}\n")
+    print("categories:")
+    for category in found.categories.values():
+        tags = f": {', '.join(sorted(category.tags))}" if category.tags else ""
+        print(f"  {category.name}{tags}")
+    print("\npredicates:")
+    for predicate in found.predicates.values():
+        values = f" = {' | '.join(predicate.values)}" if predicate.values else ""
+        several = ", ".join(map(str, predicate.parameters))
+        print(f"  {predicate.kind.value:<10}{predicate.name}({several}){values}")
+    print(f"\nskills:\n\n{skill_sheet(found)}", end="")
+    return 0
+
+
+@domain.command
+def check(file: str, /) -> int:
+    """Check a domain file: one line, "ok: ..." or what is wrong and where.
+
+    Args:
+        file: a TOML or PDDL file, or the name of a domain that comes with the project.
+    """
+    from forestall.domain.load import load_domain
+
+    found = load_domain(file)
+    print(f"ok: {found.name}: {_sentence(found)}")
+    return 0
+
+
+@domain.command
+def export(
+    name: str,
+    /,
+    *,
+    to: Annotated[Literal["toml", "pddl", "words", "schema"], Parameter(name="--format")],
+    without_processes: Flag = False,
+    without_makers: Flag = False,
+) -> int:
+    """Print a domain in another form.
+
+    Args:
+        name: of a domain that comes with the project, or a TOML or PDDL file.
+        to: toml: a domain file; pddl: a PDDL domain; words: the skill sheet; schema: the JSON
+            schema of domain files.
+        without_processes: leave what happens by itself out of the PDDL, which cannot say it.
+        without_makers: leave skills that make things or take them away out of the PDDL.
+    """
+    from forestall.domain.load import load_domain
+
+    found = load_domain(name)
+    if to == "toml":
+        from forestall.domain.toml_out import domain_toml
+
+        text = domain_toml(found)
+    elif to == "pddl":
+        from forestall.domain.pddl_out import domain_pddl
+
+        text = domain_pddl(
+            found, without_processes=without_processes, without_makers=without_makers
+        ).text
+    elif to == "words":
+        from forestall.domain.sheet import skill_sheet
+
+        text = skill_sheet(found)
+    else:
+        from forestall.domain.json_schema import domain_schema
+
+        text = json.dumps(domain_schema(), indent=2) + "\n"
+    print(text, end="")
+    return 0
+
+
+def _counts(found: Domain) -> dict[str, int]:
+    return {
+        "categories": len(found.categories),
+        "predicates": len(found.predicates),
+        "skills": len(found.skills),
+        "processes": len(found.processes),
+        "safety_rules": len(found.safety),
+    }
+
+
+def _sentence(found: Domain) -> str:
+    return ", ".join(f"{n} {k.replace('_', ' ')}" for k, n in _counts(found).items())

@@ -1,0 +1,51 @@
+"""Timings: one line of a folder for each group, taken up again, never mixed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from forestall.errors import FileFormatError, InputError
+from forestall.experiments import speed
+from forestall.experiments.engines import make_lanes
+from forestall.experiments.folder import ROWS
+from forestall.experiments.speed import GROUPS, Timed, Timing, measure
+
+taken: list[str] = []
+
+
+def fake(job: Timing) -> Timed:
+    """A timing that takes no time."""
+    taken.append(job.group)
+    row = {"what": job.group, "unit": "ms", "median": 1.0, "least": 1.0, "most": 1.0, "n": 1}
+    return Timed(job.group, ({**row, "aim": None},), {})
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed, "take", fake)
+    monkeypatch.setattr(speed, "make_lanes", lambda *_: make_lanes("inline", 1))
+    taken.clear()
+
+
+def test_a_measurement_goes_on_where_it_was(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    whole = measure(3, 0, tmp_path, lambda done, total, what: told.append((done, total)))
+    assert [r["what"] for r in whole["rows"]] == list(GROUPS)
+    assert whole["machine"]["cores"]
+    assert told == [(k, len(GROUPS)) for k in range(len(GROUPS) + 1)]
+    lines = (tmp_path / ROWS).read_text().splitlines(keepends=True)
+    (tmp_path / ROWS).write_text(lines[0] + lines[1][:9])
+    taken.clear()
+    assert measure(3, 0, tmp_path, lambda *_: None)["rows"] == whole["rows"]
+    assert taken == list(GROUPS[1:])
+
+
+def test_timings_of_another_kind_are_not_mixed_in(tmp_path: Path) -> None:
+    measure(3, 0, tmp_path, lambda *_: None)
+    with pytest.raises(InputError, match="repeat 3"):
+        measure(4, 0, tmp_path, lambda *_: None)
+    (tmp_path / ROWS).write_text("{}\n")
+    with pytest.raises(FileFormatError, match="line 1: not a timing"):
+        measure(3, 0, tmp_path, lambda *_: None)

@@ -1,0 +1,39 @@
+"""The kitchen as the world part of a run."""
+
+from __future__ import annotations
+
+import pytest
+
+from forestall.errors import UnknownNameError
+from forestall.types.scene import SceneNeeds
+from forestall.domain.load import shipped
+from forestall.worlds.kitchen import part
+from forestall.worlds.kitchen.part import Kitchens
+
+
+def test_an_unknown_renderer_is_named_before_a_kitchen_is_built() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean embree"):
+        Kitchens("embre")
+
+
+def test_frames_are_remembered_only_where_many_runs_follow(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[object] = []
+    real = part.KitchenEnvironment
+
+    def environment(*args: object, frames: object) -> object:
+        made.append(frames)
+        return real(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(part, "KitchenEnvironment", environment)
+    kitchens = Kitchens()
+    for remember in (False, True, True):
+        with kitchens.open(SceneNeeds(), shipped("household"), remember) as opened:
+            assert opened.environment is opened.disturbance
+    assert made[0] is None
+    assert made[1] is made[2] is not None
+
+
+def test_it_says_what_of_it_works_here() -> None:
+    found = Kitchens().check()
+    assert [w.needed for w in found] == [True, *[False] * (len(found) - 1)]
+    assert {w.what for w in found[1:]} >= {"renderer embree", "renderer rays"}
