@@ -9,9 +9,13 @@ from forestall.assembly.demonstrations import RecordingJob, record_one
 from forestall.assembly.make import prepare, run_episode
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.memory.store import open_store
+from forestall.planning.goals import alternatives
+from forestall.planning.planner import plan_goal, plan_to
+from forestall.planning.state import State
 from forestall.records.record import read_record, write_record
 from forestall.report.page import page_html
 from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
+from forestall.testing.symbolic_scene import start_scene
 from forestall.types.episode import EpisodeEnd, SkillStatus
 from forestall.types.verdict import Decision, ReplanOutcome
 
@@ -111,6 +115,24 @@ def test_the_alarm_comes_in_time_with_its_cause_and_a_plan_that_works(memory, na
     assert record.success, record.failures
     assert record.harmed == ()
     assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in record.executed)
+
+
+def test_a_plan_knows_what_its_needs_stand_on_and_leaves_the_floor_alone():
+    """The arm and its jaws are no part of the goal, and every step needs them."""
+    loaded = load_task("glue-peg")
+    graph = start_scene(loaded.domain, loaded.task.scene, 3)
+    planned = plan_goal(State.from_graph(graph, loaded.domain), loaded.task.goal)
+    assert planned.outcome is ReplanOutcome.SOLVED
+    assert not any("Floor" in a for step in planned.subtasks for a in step.args)
+
+
+def test_tools_are_changed_in_a_narrowed_problem():
+    loaded = load_task("fasten-plate")
+    state = State.from_graph(start_scene(loaded.domain, loaded.task.scene, 3), loaded.domain)
+    goals = alternatives(state, loaded.task.goal)
+    planned = plan_to(state, goals, widen=False)
+    assert planned.outcome is ReplanOutcome.SOLVED
+    assert "change_tool(Screwdriver-1)" in map(str, planned.subtasks)
 
 
 def test_watching_says_the_same_and_lets_the_thread_be_stripped(memory):
