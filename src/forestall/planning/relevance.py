@@ -310,8 +310,12 @@ class _Closure:
         """Keep by what a formula is true: without its witnesses a narrowed problem denies it."""
         if isinstance(formula, Literal):
             known = self.domain.predicates.get(formula.predicate)
+            args = formula.bind(names).args
+            key = ("rely", formula.predicate, *args)
+            if key in self.visited:  # definitions may lead back to themselves
+                return
+            self.visited.add(key)
             if known is not None and known.definition is not None and formula.value == "true":
-                args = formula.bind(names).args
                 inner = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
                 self._rely(normal(known.definition), inner)
         elif isinstance(formula, And | Or):
