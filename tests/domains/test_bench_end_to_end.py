@@ -7,6 +7,7 @@ import pytest
 from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.demonstrations import RecordingJob, record_one
 from forestall.assembly.make import prepare, run_episode
+from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.memory.store import open_store
 from forestall.planning.goals import alternatives
@@ -154,3 +155,13 @@ def test_a_run_without_pictures_has_a_page_and_reads_back(memory, tmp_path):
     again = read_record(tmp_path / "run")
     assert again.executed == record.executed
     assert page_html(again, tmp_path / "run") == html
+
+
+def test_the_command_line_needs_to_be_told_nothing_else(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("FORESTALL_CACHE", str(tmp_path / "cache"))
+    out = tmp_path / "run"
+    args = ["run", "hand-over-washer", "--scenario", "tray-full", "--quiet", "--out", str(out)]
+    assert call(args) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert SCENARIOS["tray-full"] in printed
+    assert (out / "index.html").is_file()
