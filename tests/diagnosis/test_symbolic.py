@@ -7,6 +7,7 @@ import pytest
 
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.domain.model import Domain
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.validate import GraphValidator, observed, unmet
 from forestall.replanning.symbolic import PlannerReplanner

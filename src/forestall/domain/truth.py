@@ -134,9 +134,9 @@ class GraphView:
                 for i in ids
             ]
         values = [literal_truth(g, self, {}) for g in ground]
-        if not values:  # of what is not there nothing is true, and every denial is
-            return Truth.TRUE if literal.value == "false" else Truth.UNOBSERVED
-        return _TRUTH[min(values) if literal.value == "false" else max(values)]
+        if literal.value == "false":
+            return _TRUTH[min(values, default=TRUE)]
+        return _TRUTH[max(values, default=UNOBSERVED)]
 
 
 _recent: OrderedDict[tuple[int, int], GraphView] = OrderedDict()

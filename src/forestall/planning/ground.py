@@ -476,6 +476,22 @@ def simple_needs(domain: Domain, skill: Skill) -> Formula:
     return And(tuple(p for p in parts if free(p) <= own and _simple(domain, p)))
 
 
+def plain_parts(domain: Domain, formula: Formula) -> And:
+    """The parts of a conjunction that never change; the same object for the same formula."""
+    found = domain.__dict__.setdefault("_plain_parts", {}).get(id(formula))
+    if found is None or found[0] is not formula:
+        parts = tuple(p for p in _conjuncts(normal(formula)) if _unchanging(domain, p))
+        found = domain.__dict__["_plain_parts"][id(formula)] = (formula, And(parts))
+    return found[1]  # type: ignore[no-any-return]
+
+
+def _unchanging(domain: Domain, formula: Formula) -> bool:
+    if not isinstance(formula, Literal) or formula.predicate == FACING:
+        return False
+    known = domain.predicates.get(formula.predicate)
+    return known is None or known.kind is PredicateKind.STATIC
+
+
 def _atom(fact: Literal, names: Names) -> tuple[str, ...] | None:
     args = tuple([names.get(a, a) for a in fact.args])
     return None if any(a.startswith("?") for a in args) else (fact.predicate, *args)

@@ -94,6 +94,8 @@ def _on_everything(
     """The search that proves something, or finds what narrowing has hidden."""
     limits = replace(config, time_limit_s=min(config.time_limit_s, config.whole_limit_s))
     tried = _attempt(state, goals, everything(state), limits, careful=False)
+    if tried.outcome is ReplanOutcome.TIMEOUT and limits.time_limit_s < config.time_limit_s:
+        tried = replace(tried, outcome=ReplanOutcome.NOT_FOUND)
     return replace(tried, expanded=before.expanded + tried.expanded)
 
 

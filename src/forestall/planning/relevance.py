@@ -24,7 +24,7 @@ from forestall.domain.formula import (
 )
 from forestall.domain.model import Copy, Domain, Effect, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, Made, makeable
-from forestall.planning.ground import simple_needs
+from forestall.planning.ground import plain_parts, simple_needs
 from forestall.planning.grounder import Grounder, Universe
 from forestall.planning.nodes import Node
 from forestall.planning.schemas import schemas_of
@@ -198,15 +198,15 @@ class _Possible(Grounder):
                 continue
             more = []
             for known in several:
-                found: dict[str, None] = {}
-                for formula in choice.among:
-                    needed = self.schemas.free(formula) | self.schemas.free(choice.such_that)
-                    if needed - {variable} <= known.keys():
-                        join = self.schemas.join((choice.variable,), formula, self.schemas.free(formula))
-                        found.update((b[variable], None) for b, _ in join(self, known))
-                        if found and not _asks_state(self.domain, formula):
+                found = []
+                for formula in (*choice.among, choice.such_that):
+                    plain = plain_parts(self.domain, formula)
+                    if plain.parts and self.schemas.free(plain) - {variable} <= known.keys():
+                        join = self.schemas.join((choice.variable,), plain, frozenset(known))
+                        found = [{**known, variable: b[variable]} for b, _ in join(self, known)]
+                        if found:
                             break
-                more += [{**known, variable: x} for x in found] or [known]
+                more += found or [known]
             several = more
         for known in several:
             own = {v.name for v in way.effect.variables}
@@ -500,14 +500,4 @@ def _ways(domain: Domain) -> dict[str, list[_Way]]:
                 ways.setdefault(copy.attribute, []).append(_Way(schema, effect, copy, simple))
     domain.__dict__["_ways"] = ways
     return ways
-
-
-def _asks_state(domain: Domain, formula: Formula) -> bool:
-    from forestall.domain.formula import literals
-
-    static = {p.name for p in domain.predicates.values() if p.kind is PredicateKind.STATIC}
-    return any(
-        x.predicate not in static and x.predicate in (*domain.predicates, "facing")
-        for x, _ in literals(formula)
-    )
 

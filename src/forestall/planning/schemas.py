@@ -77,6 +77,7 @@ class World(Protocol):
 Ground = Callable[[World, Names], Node]
 Join = Callable[[World, Names], Iterator[tuple[dict[str, str], Node]]]
 Source = Callable[[World, Names], Sequence[str]]
+Trace = Callable[[World, tuple[str, ...]], Sequence[str]]
 
 
 class Schemas:
@@ -86,6 +87,7 @@ class Schemas:
         self.domain = domain
         self._formulas: dict[int, tuple[Formula, Ground]] = {}
         self._free: dict[int, tuple[Formula, frozenset[str]]] = {}
+        self._traces: dict[tuple[str, int], Trace | None] = {}
         self._normal: dict[tuple[int, bool], tuple[Formula, Formula]] = {}
         self._joins: dict[object, tuple[Formula, Join]] = {}
 
@@ -257,6 +259,11 @@ class Schemas:
             return 5, _kind(f"has_{predicate}")
         if others or args.count(variable) > 1:
             return None
+        if kind is PredicateKind.DERIVED:
+            traced = self._traced(predicate, position)
+            if traced is None:
+                return None
+            return 3, lambda w, n: traced(w, tuple([n.get(a, a) for a in args]))
         if kind is PredicateKind.RELATION:
             return 1, lambda w, n: w.related(
                 predicate, position, tuple([n.get(a, a) for a in args])
@@ -266,6 +273,55 @@ class Schemas:
                 predicate, position, tuple([n.get(a, a) for a in args])
             )
         return None
+
+    def _traced(self, predicate: str, position: int) -> Trace | None:
+        """What may stand at a position of a derived fact, the rest being given.
+
+        Its definition must say so: each of its alternatives by a relation, or, where it leads back
+        to itself, by a relation to something that stands there.
+        """
+        key = (predicate, position)
+        if key not in self._traces:
+            self._traces[key] = None
+            self._traces[key] = self._trace(predicate, position)
+        return self._traces[key]
+
+    def _trace(self, predicate: str, position: int) -> Trace | None:
+        known = self.domain.predicates[predicate]
+        assert known.definition is not None
+        roles = [p.name for p in known.parameters]
+        variable = roles[position]
+        direct: list[Source] = []
+        links: list[tuple[str, Source]] = []
+        for part in _disjuncts(normal(known.definition)):
+            inner = part.part if isinstance(part, Some) else part
+            conjuncts = _conjuncts(inner)
+            back = next(
+                (c for c in conjuncts if isinstance(c, Literal) and c.predicate == predicate), None
+            )
+            own = {v.name for v in part.variables} if isinstance(part, Some) else set()
+            if back is None:
+                found = self._best_source(conjuncts, variable, {variable} | own)
+                if found is None:
+                    return None
+                direct.append(found)
+                continue
+            via = back.args[position]
+            rest = [a for i, a in enumerate(back.args) if i != position]
+            if via not in own or rest != [r for i, r in enumerate(roles) if i != position]:
+                return None
+            found = self._best_source(conjuncts, variable, {variable} | (own - {via}))
+            if found is None:
+                return None
+            links.append((via, found))
+        return _follow(roles, position, direct, links)
+
+    def _best_source(
+        self, conjuncts: Sequence[Formula], variable: str, unbound: set[str]
+    ) -> Source | None:
+        found = [s for c in conjuncts if (s := self._source(c, variable, unbound)) is not None]
+        best = min(found, key=lambda s: s[0], default=None)
+        return None if best is None or best[0] > 3 else best[1]
 
     @staticmethod
     def _built_in(part: Literal, variable: str, others: set[str]) -> tuple[int, Source] | None:
@@ -289,6 +345,33 @@ def schemas_of(domain: Domain) -> Schemas:
 def bound_here(bound: frozenset[str], variables: Iterable[Parameter]) -> frozenset[str]:
     """What is bound before any of the variables is."""
     return bound - {v.name for v in variables}
+
+
+def _disjuncts(formula: Formula) -> tuple[Formula, ...]:
+    if isinstance(formula, Or):
+        return tuple(c for p in formula.parts for c in _disjuncts(p))
+    return (formula,)
+
+
+def _follow(
+    roles: list[str], position: int, direct: list[Source], links: list[tuple[str, Source]]
+) -> Trace:
+    """Things that a relation leads to, and on from those that were found."""
+
+    def trace(w: World, args: tuple[str, ...]) -> Sequence[str]:
+        names = {r: a for i, (r, a) in enumerate(zip(roles, args, strict=True)) if i != position}
+        found = dict.fromkeys(x for source in direct for x in source(w, names))
+        waiting = list(found)
+        while waiting:
+            thing = waiting.pop()
+            for via, source in links:
+                for name in source(w, {**names, via: thing}):
+                    if name not in found:
+                        found[name] = None
+                        waiting.append(name)
+        return tuple(found)
+
+    return trace
 
 
 def _conjuncts(formula: Formula) -> tuple[Formula, ...]:

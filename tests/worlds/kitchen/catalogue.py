@@ -59,7 +59,7 @@ TAGS: Mapping[str, Callable[[Category], bool]] = {
 """Tag → the categories of the catalogue that must carry it."""
 
 
-def _pairs(vocabulary: Domain) -> dict[str, set[tuple[str, str]]]:
+def _pairs(vocabulary: Catalogue) -> dict[str, set[tuple[str, str]]]:
     """Every static relation as the catalogue has it."""
     every = vocabulary.categories
     one = {
@@ -74,7 +74,7 @@ def _pairs(vocabulary: Domain) -> dict[str, set[tuple[str, str]]]:
     return found
 
 
-def differences(domain: Domain, vocabulary: Domain) -> Iterator[str]:
+def differences(domain: Domain, vocabulary: Catalogue) -> Iterator[str]:
     """What the domain file says otherwise than the catalogue."""
     if set(domain.categories) != set(vocabulary.categories):
         yield f"categories: {set(domain.categories) ^ set(vocabulary.categories)}"

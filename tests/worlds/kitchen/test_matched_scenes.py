@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from forestall.domain.load import shipped
-from forestall.errors import InputError, SceneError
+from forestall.errors import InputError, SceneError, UnknownNameError
 from forestall.tasks.faults import apply_scene_faults, parse_fault
 from forestall.tasks.files import load_task
 from forestall.types.scene import SceneNeeds
@@ -217,10 +217,14 @@ def test_a_scenario_scene_is_the_same_each_time() -> None:
 def test_what_cannot_vary_or_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("forestall.worlds.kitchen.model.LAYOUTS", 1)
     scene = load_task("boil-water").task.scene
-    with pytest.raises(SceneError, match="cannot vary 'smell'"):
+    with pytest.raises(UnknownNameError, match="axis of variety 'smell': known: clutter, colours"):
         build(replace(scene, vary=(("smell", 1),)), 40)
+    with pytest.raises(SceneError, match="cannot vary 'light' to -1"):
+        build(replace(scene, vary=(("light", -1),)), 40)
+    with pytest.raises(UnknownNameError, match="axis of variety 'smell'"):
+        build(needs_of("boil-water", {"kind": "vary", "axes": ["smell"]}), 40)
     with pytest.raises(InputError, match="axes"):
-        needs_of("boil-water", {"kind": "vary", "axes": ["smell"]})
+        needs_of("boil-water", {"kind": "vary", "axes": []})
     mugs: list[Mapping[str, object]] = [
         {"kind": "add_object", "category": "Mug", "places": ["CoffeeMachine"]}
     ] * 2

@@ -114,6 +114,12 @@ class Category:
     shape: Mapping[str, Any] = field(default_factory=dict, hash=False)
     defaults: tuple[tuple[str, str], ...] = ()
     aliases: tuple[str, ...] = ()
+    words: str = ""  # how a person calls it, where its name does not say so
+
+    @property
+    def spoken(self) -> str:
+        """The category in words: "remote control"."""
+        return self.words or re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", self.name).lower()
 
     @property
     def washable_food(self) -> bool:
@@ -197,11 +203,6 @@ class Catalogue:
             and category.receptacle.relation == "inside"
             and "open" in category.attributes
         )
-
-
-def spoken(category: str) -> str:
-    """A category in words: "remote control"."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", category).lower()
 
 
 @cache
@@ -316,6 +317,7 @@ def _added(domain: Domain, described: Described) -> Category:
         shape=shape,
         defaults=described.defaults,
         aliases=described.aliases,
+        words=described.words,
     )
 
 

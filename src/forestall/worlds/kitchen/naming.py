@@ -15,7 +15,6 @@ import difflib
 from typing import Protocol, runtime_checkable
 
 from forestall.types.facts import category_of, is_instance
-from forestall.worlds.kitchen.catalogue import spoken
 from forestall.worlds.kitchen.household import Household, natural_key
 
 
@@ -118,7 +117,7 @@ def _candidates(household: Household, name: str) -> list[str]:
     if is_instance(wanted) and found:
         raise RefusalError(f"there is no {wanted} here; there is {', '.join(found)}")
     if not found:
-        raise RefusalError(f"there is no {spoken(category.name)} here")
+        raise RefusalError(f"there is no {category.spoken} here")
     return found
 
 

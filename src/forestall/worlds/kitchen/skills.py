@@ -17,7 +17,6 @@ from forestall.errors import ForestallError, SceneError
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
 from forestall.worlds.kitchen import effects
-from forestall.worlds.kitchen.catalogue import spoken
 from forestall.worlds.kitchen.household import FLOOR, Household, number_of
 from forestall.worlds.kitchen.naming import (
     RefusalError,
@@ -223,7 +222,7 @@ def toggle_on(robot: Robot, target: str) -> str:
     if device is not None and device.needs_held is not None:
         held = home.held
         if held is None or home.category(held).name != device.needs_held:
-            words = spoken(device.needs_held)
+            words = home.category(device.needs_held).spoken
             raise RefusalError(f"{name} is turned on with the {words}, which is not in the gripper")
     if device is not None and device.needs_closed and home.state(name, "open") == "open":
         raise RefusalError(f"{name} cannot be turned on while it is open")
