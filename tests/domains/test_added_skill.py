@@ -5,10 +5,15 @@ from importlib.resources import files
 import pytest
 
 from forestall.domain.load import load_domain
+from forestall.planning.planner import plan_goal
+from forestall.planning.state import State
 from forestall.testing.symbolic_world import SymbolicWorld
 from forestall.types.episode import SkillStatus
+from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
+from forestall.types.task import Goal
+from forestall.types.verdict import ReplanOutcome
 
 WIPE = """
 [skills.wipe]
@@ -36,15 +41,29 @@ def household(tmp_path_factory):
     return load_domain(str(file))
 
 
-def test_wiping_is_executed(household):
+@pytest.fixture
+def world(household):
     needs = SceneNeeds(
         objects=(
             ObjectNeed("Plate-1", "Plate", ("CounterTop",), (("dirty", "dirty"),)),
             ObjectNeed("Sponge-1", "Sponge", ("CounterTop",)),
         )
     )
-    world = SymbolicWorld(household, needs)
-    world.reset(0)
+    return SymbolicWorld(household, needs)
+
+
+def test_wiping_is_planned(household, world):
+    state = State.from_graph(world.truth(), household)
+    goal = Goal("the plate is clean", literals=(Literal.parse("dirty(Plate-1)=clean"),))
+    planned = plan_goal(state, goal)
+    assert planned.outcome is ReplanOutcome.SOLVED
+    assert "wipe(Plate-1)" in map(str, planned.subtasks)
+    outcomes = [world.execute(s) for s in planned.subtasks]
+    assert {o.status for o in outcomes} == {SkillStatus.SUCCEEDED}, outcomes
+    assert world.states("Plate-1")["dirty"] == "clean"
+
+
+def test_wiping_is_executed(world):
     wipe, pick = Subtask.parse("wipe(Plate)"), Subtask.parse("pick_up(Sponge)")
     refused = world.execute(wipe)
     assert refused.status is SkillStatus.REFUSED

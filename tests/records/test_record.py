@@ -227,7 +227,6 @@ Edit = Callable[[dict[str, Any]], object]
         (lambda d: d["boundaries"][7]["verdict"]["matches"].append(["a"]), "a pair"),
         (lambda d: d["boundaries"][7]["diagnosis"].update(must_change=["?"]), "as a fact"),
         (lambda d: d["boundaries"][7]["replan"].update(plan=["fly(Mug)"]), "unknown skill"),
-        (lambda d: d["boundaries"][0]["observation"].update(cameras=[]), "at least one camera"),
         (
             lambda d: d["boundaries"][0]["observation"]["cameras"][0].update(picture="../../x"),
             "inside the folder",

@@ -17,6 +17,7 @@ from typing import Any
 from forestall.assembly.options import checked, plain
 from forestall.assembly.registry import TABLES, find, table
 from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.tasks.files import load_task
 from forestall.types.kind import Kind
 
 SHORT: Mapping[str, tuple[str, str | None]] = {
@@ -233,6 +234,7 @@ def run_config(
         keep_observations: whether pictures stay in the record.
         final_look: whether the robot looks once more when the plan is finished.
         given: what was said about parts, in a file or by flags.
+            What is not said is as the task's domain has it, else as the tables have it.
         **named: the same by keyword, over `given`: `strategy="online"`,
             `detector={"name": "objects", "threshold": 0.8}`, or a short name of `SHORT`.
 
@@ -240,6 +242,8 @@ def run_config(
         InputError: a name, an option or a value that is not valid; says what would be.
     """
     said = Given.named(named).over(given or Given())
+    if task:
+        said = said.over(Given.named(dict(load_task(task).domain.run)))
     return RunConfig(
         task,
         scenario,

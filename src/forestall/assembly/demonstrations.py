@@ -118,7 +118,7 @@ def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord],
     encoder, captioner = parts.part(IMAGE_ENCODER), parts.part(CAPTIONER)
 
     def view(boundary: BoundaryRecord) -> View | None:
-        if not isinstance(boundary.observation, Observation):
+        if not isinstance(boundary.observation, Observation) or not boundary.observation.frames:
             return None
         return view_of(boundary.observation, boundary.scoped, encoder, captioner)
 

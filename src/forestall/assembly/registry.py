@@ -46,8 +46,19 @@ _EMBEDDINGS = "forestall.embeddings"
 TABLES: Mapping[str, Table] = {
     table.kind.name: table
     for table in (
-        Table(kinds.WORLD, "kitchen", {"kitchen": "forestall.worlds.kitchen.part:Kitchens"}),
-        Table(kinds.DOMAIN, "household", {"household": f"{_SEEING}:household"}),
+        Table(
+            kinds.WORLD,
+            "kitchen",
+            {
+                "kitchen": "forestall.worlds.kitchen.part:Kitchens",
+                "symbolic": "forestall.testing.part:SymbolicWorlds",
+            },
+        ),
+        Table(
+            kinds.DOMAIN,
+            "household",
+            {"bench": f"{_SEEING}:bench", "household": f"{_SEEING}:household"},
+        ),
         Table(
             kinds.SEGMENTER,
             "instance-ids",
@@ -61,7 +72,11 @@ TABLES: Mapping[str, Table] = {
             "learned",
             {name: f"{_SEEING}:{name}" for name in ("clip", "given", "learned", "oracle")},
         ),
-        Table(kinds.PERCEIVER, "graph", {"graph": f"{_SEEING}:graph"}),
+        Table(
+            kinds.PERCEIVER,
+            "graph",
+            {"given-graph": f"{_SEEING}:given_graph", "graph": f"{_SEEING}:graph"},
+        ),
         Table(
             kinds.TEXT_ENCODER,
             "hashed-words",

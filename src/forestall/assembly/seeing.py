@@ -13,6 +13,7 @@ from forestall.embeddings.captions import ListingCaptioner
 from forestall.kinds import IMAGE_ENCODER, SEGMENTER, STATES
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.given import GivenStateEstimator
+from forestall.perception.given_graph import GraphPassthrough
 from forestall.perception.learned import LearnedStateEstimator
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
@@ -54,6 +55,11 @@ def household() -> Domain:
     return shipped("household")
 
 
+def bench() -> Domain:
+    """The assembly bench that comes with the project."""
+    return shipped("bench")
+
+
 def oracle(parts: Parts) -> OracleStateEstimator:
     """The truth of what a camera could tell."""
     return OracleStateEstimator(parts.lent("truth").states, parts.domain)
@@ -87,6 +93,16 @@ def graph(
         scope,
         image_encoder=look_encoder(parts) if feature is Feature.IMAGE else None,
     )
+
+
+def given_graph(parts: Parts, *, scope: ScopeConfig | None = None) -> GraphPassthrough:
+    """The scene graph that an observation comes with.
+
+    Args:
+        parts: the domain.
+        scope: what concerns a subtask.
+    """
+    return GraphPassthrough(parts.domain, scope)
 
 
 def look_encoder(parts: Parts) -> ImageTextEncoder:

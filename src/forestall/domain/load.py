@@ -34,7 +34,7 @@ from forestall.errors import FileFormatError, InputError, UnknownNameError
 
 _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
-    "skills", "processes", "safety", "constants", "spelling",
+    "skills", "processes", "safety", "constants", "spelling", "run",
 )  # fmt: skip
 _ATTRIBUTE = (
     "values", "phrases", "by_category", "camera", "lasting", "mined", "bins", "unit", "words",
@@ -140,6 +140,7 @@ def build_domain(data: Mapping[str, Any]) -> Domain:
         robot=_record(Robot, "robot", data.get("robot", {})),
         constants=_pairs("constants", data),
         spelling=_pairs("spelling", data),
+        run=_pairs("run", data),
     )
     check_domain(domain)
     return domain

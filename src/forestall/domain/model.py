@@ -394,6 +394,8 @@ class Domain:
     robot: Robot = Robot()
     constants: tuple[tuple[str, str], ...] = ()
     spelling: tuple[tuple[str, str], ...] = ()
+    run: tuple[tuple[str, str], ...] = ()
+    """(Kind of part, name): what a run in this domain has when nothing is said."""
 
     def __hash__(self) -> int:
         return hash(self.name)

@@ -47,7 +47,9 @@ def demonstration_from(
                 graph=b.scoped,
                 whole=b.graph,
                 image=None
-                if keep_image is None or not isinstance(b.observation, Observation)
+                if keep_image is None
+                or not isinstance(b.observation, Observation)
+                or not b.observation.frames
                 else keep_image(b.observation.frames[-1].rgb),
                 view=None if view_of is None else view_of(b),
             )

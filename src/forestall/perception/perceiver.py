@@ -63,9 +63,13 @@ class GraphPerceiver:
         """Fuse an observation and return the whole graph as believed now.
 
         Raises:
-            PerceptionError: a frame without the masks that the segmenter needs, a state
-                estimator or an image encoder that does not answer for every detection.
+            PerceptionError: no frame at all, one without the masks that the segmenter needs, a
+                state estimator or an image encoder that does not answer for every detection.
         """
+        if not observation.frames:
+            raise PerceptionError(
+                "the observation has no picture, only a scene graph: use the perceiver given-graph"
+            )
         known: dict[str, Points] = {
             n: t.centroid_m for n, t in self._memory.tracks.items() if t.points_world_m is not None
         }

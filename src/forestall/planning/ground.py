@@ -161,7 +161,10 @@ class _Grounding:
         if not all(a in self.grounder.categories for a in atom[1:]):
             return False
         if self.domain.predicates[atom[0]].contains:
-            return self.universe.allows(self.domain, atom[1], atom[2])
+            stays = atom[1] in self.universe.things and not self.domain.is_a(
+                self.grounder.categories[atom[1]], self.domain.roles.movable
+            )  # no hand puts it anywhere: where a skill leaves it is no choice of the plan
+            return stays or self.universe.allows(self.domain, atom[1], atom[2])
         return True
 
     def _bindings(self, plan: _SkillPlan) -> Iterator[Names]:

@@ -302,8 +302,33 @@ class _Closure:
         if depth > DEPTH or not self.schemas.free(formula) <= names.keys():
             return
         if not always and evaluate(formula, self.state, names) == TRUE:
+            self._rely(normal(formula), names)
             return
         self._need(self.schemas.normal(formula), names, depth)
+
+    def _rely(self, formula: Formula, names: Names) -> None:
+        """Keep by what a formula is true: without its witnesses a narrowed problem denies it."""
+        if isinstance(formula, Literal):
+            known = self.domain.predicates.get(formula.predicate)
+            args = formula.bind(names).args
+            key = ("rely", formula.predicate, *args)
+            if key in self.visited:  # definitions may lead back to themselves
+                return
+            self.visited.add(key)
+            if known is not None and known.definition is not None and formula.value == "true":
+                inner = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
+                self._rely(normal(known.definition), inner)
+        elif isinstance(formula, And | Or):
+            for part in formula.parts:
+                if evaluate(part, self.state, names) == TRUE:
+                    self._rely(part, names)
+        elif isinstance(formula, Some):
+            new = {v.name for v in formula.variables}
+            for bound, truth in solutions(formula.variables, formula.part, self.state, names):
+                if truth == TRUE:
+                    self.keep(bound[v] for v in sorted(new))
+                    self._rely(formula.part, bound)
+                    return
 
     def _need(self, formula: Formula, names: Names, depth: int) -> None:
         if isinstance(formula, Literal):

@@ -112,6 +112,7 @@ def page_view(record: EpisodeRecord, folder: Path | None) -> Page:
         1 + 0.3 * min(_MAX_VIEWS, len(m.boundary.observation.frames) - 1)
         for m in all_moments
         if m.boundary is not None and m.boundary.observation is not None
+        if m.boundary.observation.frames
     )
     budget = int(_PICTURES_BYTES / max(10.0, frames))
     cards = tuple(_card(record, i, m, budget, folder) for i, m in enumerate(all_moments, 1))
@@ -194,7 +195,7 @@ def _verb(moment: Moment) -> str:
 def _pictures(
     observation: Observation | StoredObservation | None, budget: int, folder: Path | None
 ) -> tuple[Picture | None, tuple[Picture, ...], Picture | None]:
-    if observation is None:
+    if observation is None or not observation.frames:
         return None, (), None
     *others, newest = (rgb_of(frame, folder) for frame in observation.frames)
     if newest is None:

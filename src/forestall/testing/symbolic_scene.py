@@ -1,7 +1,8 @@
 """Start scenes of symbolic worlds: what a task needs, drawn by seed, as a scene graph.
 
-Called by `symbolic_world`; calls the domain. There is one fixture of every category, and as many
-more as the needs name; a further thing or another state of one thing moves nothing else.
+Called by `symbolic_world`; calls the domain. There is one fixture of every category, a few of those
+that only numbers tell apart, and as many more as the needs name; a further thing or another state
+of one thing moves nothing else.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from forestall.errors import InputError
 from forestall.types.facts import is_instance
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.scene import SceneNeeds
+
+NUMBERED = 4
+"""How many there are of fixtures that only numbers tell apart."""
 
 
 def start_scene(domain: Domain, needs: SceneNeeds, seed: int) -> SceneGraph:
@@ -71,7 +75,10 @@ class _Scene:
         for name, attribute, value in needs.fixtures:
             states.setdefault(name, {})[attribute] = value
         named = [p for o in needs.objects for p in o.places if is_instance(p)]
-        fixtures = {f"{c}-1" for c in domain.tagged(domain.roles.fixture)} | set(states)
+        fixtures = set(states)
+        for kind in domain.tagged(domain.roles.fixture):
+            count = NUMBERED if domain.is_a(kind, domain.roles.numbered) else 1
+            fixtures |= {f"{kind}-{i}" for i in range(1, count + 1)}
         fixtures |= {n for n in named if domain.is_a(n, domain.roles.fixture)}
         for name in sorted(fixtures, key=by_number):
             self.add(name, domain[name].name, tuple(states.get(name, {}).items()))
@@ -103,6 +110,7 @@ class _Scene:
         count = int(rng.integers(low, high + 1)) + self.needs.more_clutter
         asked = self.needs.undisturbed or self.needs
         wanted = {o.category for needs in (asked, self.needs) for o in needs.objects}
+        wanted |= {made for c in self.domain.categories for made in self.domain.becomes(c)}
         free = [c for c in self.domain.tagged(self.domain.roles.movable) if c not in wanted]
         for i in rng.permutation(len(free))[:count]:
             if any(self._takes(p, free[i]) for p in self._supports()):
