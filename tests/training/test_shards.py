@@ -9,6 +9,8 @@ from forestall.training.scenes import Artist, SceneConfig
 from forestall.training.shards import PictureConfig, make_shard, read
 from forestall.vocabulary import ATTRIBUTES, household
 
+pytestmark = pytest.mark.simulator
+
 SMALL = PictureConfig(1, 1, 1, 1, SceneConfig(views=2, things=(6, 8)), "embree")
 
 
