@@ -83,6 +83,7 @@ def fast_downward(text: Pddl, folder: Path) -> list[str] | None:
     return [a.action.name for a in result.plan.actions]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     importlib.util.find_spec("unified_planning") is None
     or importlib.util.find_spec("up_fast_downward") is None,

@@ -10,6 +10,8 @@ from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, SceneConfig
 from forestall.training.shards import PictureConfig, make_shard, read
 
+pytestmark = pytest.mark.simulator
+
 SMALL = PictureConfig(1, 1, 1, 1, SceneConfig(views=2, things=(6, 8)), "embree")
 
 
