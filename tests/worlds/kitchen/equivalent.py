@@ -62,7 +62,27 @@ UNREACHABLE: dict[str, str] = {
 
 EQUIVALENT: dict[str, str] = {
     r".*: need \d+ \[located\(.*": _LOST,
+    r"toggle_on: done_when: \[located.*": _LOST,
+    r"crack_obj: choice \?vessel such_that: \[located.*": _LOST,
     r"put_(in|on): need 5 \[not within.*": _NESTED,
+    r"put_(in|on): need [89]: .*\[\(?not .*": _CAPACITY,
+    r"crack_obj: choice \?vessel such_that: \[not (limited|takes_).*": _CAPACITY,
+    r"put_(in|on): effect 1: when \[takes_inside.*":
+        "where a thing is on top of a place it is not inside it: the second effect takes the first back",
+    r"put_(in|on): done_when: \[not held_by.*":
+        "what cannot be picked up is never in the gripper",
+    r"put_(in|on): effect [345]: when \[food.*":
+        "vessels with liquid and washable dishes take nothing but food",
+    r"(crack|slice)_obj: effect \d+: when \[food\(\?piece\)\]": _PIECE,
+    r"slice_obj: effect [48]: when \[(sliced|cooked).*cooked\]": "slices are sliced, cooked or not",
+    r"crack_obj: effect \d+: when \[held_by\(\?object, gripper\)\]":
+        "the vessel is only chosen for an egg that is held",
+    r"crack_obj: choice \?vessel among 3: \[on_top_of.*":
+        "what has room on top of it beside a thing is the outermost thing that it is within",
+    r"open_obj: need 4: \[not needs_closed.*": _ALIKE,
+    r"toggle_on: need 4: \[not needs_closed.*": _ALIKE,
+    r"pour: effect 1: when \[not drains.*": "what drains holds no liquid",
+    r"pour: effect 2: when \[on_top_of.*": _LIQUID,
     r"pick_up: effect 2: not blocking\(\?y, \?object\)":
         "nothing stands in front of what can be picked up",
     r"(crack|slice)_obj: effect (6|7)( .*|:.*)?": _LIQUID,
