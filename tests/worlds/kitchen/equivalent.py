@@ -68,7 +68,7 @@ EQUIVALENT: dict[str, str] = {
     r"put_(in|on): need [89]: .*\[\(?not .*": _CAPACITY,
     r"crack_obj: choice \?vessel such_that: \[not (limited|takes_).*": _CAPACITY,
     r"put_(in|on): effect 1: when \[takes_inside.*":
-        "where a thing is on top of a place it is not inside it: the second effect takes the first back",
+        "a thing on top of a place is not inside it: effect 2 takes effect 1 back",
     r"put_(in|on): done_when: \[not held_by.*":
         "what cannot be picked up is never in the gripper",
     r"put_(in|on): effect [345]: when \[food.*":
@@ -82,6 +82,9 @@ EQUIVALENT: dict[str, str] = {
     r"open_obj: need 4: \[not needs_closed.*": _ALIKE,
     r"toggle_on: need 4: \[not needs_closed.*": _ALIKE,
     r"pour: effect 1: when \[not drains.*": "what drains holds no liquid",
+    r"(pour|slice_obj): at":
+        "the hand is full then, and the put that must come first changes what is faced",
+    r"process (wash|run_water|soak): kind of \?tap.*": "only a tap serves a basin",
     r"pour: effect 2: when \[on_top_of.*": _LIQUID,
     r"pick_up: effect 2: not blocking\(\?y, \?object\)":
         "nothing stands in front of what can be picked up",
