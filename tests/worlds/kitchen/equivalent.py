@@ -15,6 +15,7 @@ _LIQUID = "what holds liquid has things inside it, and never on top of it"
 _DEVICE = "basins and devices that fill have things inside them, and never on top of them"
 _NESTED = "no movable vessel takes another one"
 _CAPACITY = "only what is limited has a capacity, and things are only where a place takes them"
+_HELD = "a vessel matters, and is chosen, only for an egg that is held"
 _PIECE = "whatever is cut or cracked open becomes food"
 _FRESH = "a cracked egg has no slices, and an egg in its shell is never cooked"
 _ONE = "a burner and a microwave take one thing, and no vessel stands in another"
@@ -40,7 +41,7 @@ UNREACHABLE: dict[str, str] = {
     r"crack_obj: effect (14|15) not because of \[not filled.*": _LIQUID,
     r"crack_obj: effect (10|11) not because of \[takes_inside.*": _LIQUID,
     r"crack_obj: effect \d+ not because of \[held_by.*":
-        "the vessel is only chosen for an egg that is held",
+        _HELD,
     r"crack_obj: choice \?vessel such that not because of \[\(not limited.*takes_inside.*":
         "no vessel that takes one thing inside takes a cracked egg",
     r"open_obj: need 4 only by \[not needs_closed.*": _ALIKE,
@@ -76,7 +77,7 @@ EQUIVALENT: dict[str, str] = {
     r"(crack|slice)_obj: effect \d+: when \[food\(\?piece\)\]": _PIECE,
     r"slice_obj: effect [48]: when \[(sliced|cooked).*cooked\]": "slices are sliced, cooked or not",
     r"crack_obj: effect \d+: when \[held_by\(\?object, gripper\)\]":
-        "the vessel is only chosen for an egg that is held",
+        _HELD,
     r"crack_obj: choice \?vessel among 3: \[on_top_of.*":
         "what has room on top of it beside a thing is the outermost thing that it is within",
     r"open_obj: need 4: \[not needs_closed.*": _ALIKE,
@@ -88,8 +89,8 @@ EQUIVALENT: dict[str, str] = {
         "a thing on top of a place is not inside it: effect 13 takes effect 9 back",
     r"crack_obj: effect (10|11): when \[takes_inside.*": _LIQUID,
     r"crack_obj: effect (9|1[0-6]): when \[held_by.*":
-        "the vessel is only chosen for an egg that is held",
-    r"crack_obj: choice \?vessel only_if(:.*)?": "without an egg in the hand the vessel has no effect",
+        _HELD,
+    r"crack_obj: choice \?vessel only_if(:.*)?": _HELD,
     r"crack_obj: choice \?vessel such_that: \[(\(not limited.*takes_inside|fewer.*inside).*":
         "no vessel that takes one thing inside takes a cracked egg",
     r"pour: effect 2: kind of \?y - food": _FOOD,
