@@ -126,3 +126,20 @@ def test_goals_over_unions_that_the_domain_does_not_have() -> None:
     text = text.replace("(?b - box) (and", "(?b - (either box toy)) (and")
     with pytest.raises(DomainError, match=r"line \d+: no action of tidy is about the types of \?b"):
         read_problem(text, state.domain)
+
+
+def test_predicates_that_are_defined_with_each_other() -> None:
+    text = """(define (domain steps)
+      (:predicates (next ?a ?b) (odd ?a ?b) (even ?a ?b) (far ?a ?b))
+      (:derived (odd ?a ?b) (or (next ?a ?b) (exists (?c) (and (next ?a ?c) (even ?c ?b)))))
+      (:derived (even ?a ?b) (exists (?c) (and (next ?a ?c) (odd ?c ?b))))
+      (:derived (far ?a ?b) (and (not (odd ?a ?b)) (even ?a ?b))))"""
+    domain = read_pddl(text, "steps.pddl")
+    assert domain.recursive["odd"] is domain.recursive["even"]
+    assert "far" not in domain.recursive
+    given = """(define (problem p) (:domain steps) (:objects a b c d x y z)
+      (:init (next a b) (next b c) (next c d) (next d a) (next x y) (next y z) (next z x))
+      (:goal (and (odd a b) (even a c) (far b d) (odd x x) (even x x) (not (even a b)))))"""
+    state, goal = read_problem(given, domain)
+    assert state.true(goal)
+    assert not state.says("far", "x", "y") and not state.says("odd", "a", "x")
