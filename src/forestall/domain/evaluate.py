@@ -132,8 +132,9 @@ def _truth_of(predicate: str, args: tuple[str, ...], view: View) -> int:
             return UNOBSERVED
         return TRUE if predicate in domain.kinds(view.category(args[0])) else FALSE
     if known.kind is PredicateKind.DERIVED:
-        if predicate in domain.recursive:
-            return _recursive_truth(known, args, view)
+        members = domain.recursive.get(predicate)
+        if members is not None:
+            return _recursive_truth(known, args, view, members)
         return _defined_truth(known, args, view)
     if UNKNOWN in args:
         return UNOBSERVED
@@ -151,52 +152,53 @@ def _defined_truth(known: Predicate, args: tuple[str, ...], view: View) -> int:
 class _Circle:
     """What is known so far of predicates that are defined with each other, in one view."""
 
+    __slots__ = ("best", "closed", "members", "now", "view")
+
     def __init__(self, view: View, members: frozenset[str]) -> None:
         self.view, self.members = view, members
-        self.found: dict[tuple[str, ...], int] = {}
-        self.asked: set[tuple[str, ...]] = set()
-        self.open: set[tuple[str, ...]] = set()
-        self.rose = self.closed = False
+        self.best: dict[tuple[str, ...], int] = {}
+        self.now: dict[tuple[str, ...], int | None] = {}
+        self.closed = False
 
     def ask(self, known: Predicate, args: tuple[str, ...]) -> int:
+        """The truth as far as it is known; None marks what is being asked just now."""
         key = (known.name, *args)
-        if key in self.asked:
-            self.closed |= key in self.open
-            return self.found.get(key, FALSE)
-        self.asked.add(key)
-        self.open.add(key)
-        truth = max(_defined_truth(known, args, self.view), self.found.get(key, FALSE))
-        self.open.discard(key)
-        self.rose |= truth > self.found.get(key, FALSE)
-        self.found[key] = truth
+        if key in self.now:
+            found = self.now[key]
+            if found is not None:
+                return found
+            self.closed = True
+            return self.best.get(key, FALSE)
+        self.now[key] = None
+        truth = self.now[key] = _defined_truth(known, args, self.view)
         return truth
 
+    def rises(self) -> bool:
+        """Whether going round once more can make more of it true."""
+        best = {k: t for k, t in self.now.items() if t}
+        again = self.closed and best != self.best
+        self.best, self.now, self.closed = best, {}, False
+        return again
 
-class _Circles(threading.local):
-    def __init__(self) -> None:
-        self.stack: list[_Circle] = []
+
+_open = threading.local()
 
 
-_circles = _Circles()
-
-
-def _recursive_truth(known: Predicate, args: tuple[str, ...], view: View) -> int:
+def _recursive_truth(
+    known: Predicate, args: tuple[str, ...], view: View, members: frozenset[str]
+) -> int:
     """The least fixpoint, so that facts that go in a circle support nothing."""
-    stack = _circles.stack
-    members = view.domain.recursive[known.name]
-    if stack and stack[-1].view is view and stack[-1].members == members:
-        return stack[-1].ask(known, args)
-    circle = _Circle(view, members)
-    stack.append(circle)
+    outer: _Circle | None = getattr(_open, "circle", None)
+    if outer is not None and outer.view is view and outer.members is members:
+        return outer.ask(known, args)
+    circle = _open.circle = _Circle(view, members)
     try:
         while True:
             truth = circle.ask(known, args)
-            if not (circle.rose and circle.closed):
+            if not circle.closed or not circle.rises():
                 return truth
-            circle.asked.clear()
-            circle.rose = circle.closed = False
     finally:
-        stack.pop()
+        _open.circle = outer
 
 
 def static_holds(view: View, predicate: str, args: tuple[str, ...]) -> bool:

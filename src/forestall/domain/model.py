@@ -619,7 +619,10 @@ class Domain:
 
     @cached_property
     def recursive(self) -> dict[str, frozenset[str]]:
-        """Derived predicate → those that it is defined with in a circle, itself included."""
+        """Derived predicate → those that it is defined with in a circle, itself included.
+
+        The predicates of one circle share one set.
+        """
         uses = {
             p.name: {x.predicate for x, _ in literals(p.definition) if x.predicate in self.derived}
             for p in self.derived.values()
@@ -634,11 +637,13 @@ class Domain:
                     found.add(other)
                     left += uses[other]
             reached[name] = found
-        return {
-            name: frozenset(o for o in found if name in reached[o])
-            for name, found in reached.items()
-            if name in found
-        }
+        circles: dict[frozenset[str], frozenset[str]] = {}
+        found_in: dict[str, frozenset[str]] = {}
+        for name, found in reached.items():
+            if name in found:
+                members = frozenset(o for o in found if name in reached[o])
+                found_in[name] = circles.setdefault(members, members)
+        return found_in
 
     # --- skills ----------------------------------------------------------------------------------
 

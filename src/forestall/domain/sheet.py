@@ -173,13 +173,15 @@ def _fact(domain: Domain, literal: Literal, positive: bool = True) -> str:
     if not args:
         text = f"it is {name}"
     elif len(args) == 1 or name in _PLACES:
-        text = f"{args[0]} is {name} {', '.join(args[1:])}".strip()
+        text = f"{args[0]} is {name.removeprefix('is ')} {', '.join(args[1:])}".strip()
     else:
         text = f"{args[0]} {name} {', '.join(args[1:])}"
     return text if positive else _denied(text)
 
 
 def _denied(text: str) -> str:
+    if text.startswith("nothing "):
+        return text.replace("nothing", "something", 1)
     for verb, opposite in _OPPOSITES:
         if verb in text:
             return text.replace(verb, opposite, 1)
