@@ -15,12 +15,12 @@ from forestall.comparison.preconditions import mine, violations
 from forestall.comparison.score import BatchScorer, ScoreConfig
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.domain.load import domain_of
 from forestall.embeddings.views import view_of
 from forestall.errors import InputError, UnknownNameError
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
-from forestall.domain.load import domain_of
 from forestall.planning.validate import AcceptAll, GraphValidator
 from forestall.registry import known, load
 from forestall.replanning.symbolic import PlannerReplanner

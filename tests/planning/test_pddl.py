@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from forestall.planning.goals import alternatives
 from forestall.planning.pddl import GOAL, Pddl, export
 from forestall.planning.planner import pose, with_driving
 from forestall.planning.problem import Problem
-from forestall.planning.goals import alternatives
 from forestall.planning.search import SearchOutcome, solve
 from forestall.planning.state import State
 from forestall.planning.validate import GraphValidator, observed
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
-from planning.corpus import GOALS, KITCHEN, LARGE, LARGE_SCENE, DOMAIN, home_of, scene
+from planning.corpus import DOMAIN, GOALS, KITCHEN, LARGE, LARGE_SCENE, home_of, scene
 from planning.test_search import DISTURBED, UNSOLVABLE
 
 POSED: dict[str, tuple[str, Goal]] = {

@@ -234,9 +234,7 @@ class Schemas:
             steps.append((variable.name, source, variable.kind, checks))
         return _joined(before, steps)
 
-    def _source(
-        self, part: Formula, variable: str, unbound: set[str]
-    ) -> tuple[int, Source] | None:
+    def _source(self, part: Formula, variable: str, unbound: set[str]) -> tuple[int, Source] | None:
         """Where the things come from for which a part can be true."""
         if isinstance(part, Or):
             several = [self._source(p, variable, unbound) for p in part.parts]
@@ -267,7 +265,9 @@ class Schemas:
                 return None
             return 3, lambda w, n: traced(w, tuple([n.get(a, a) for a in args]))
         if kind is PredicateKind.RELATION:
-            return 1, lambda w, n: w.related(predicate, position, tuple([n.get(a, a) for a in args]))
+            return 1, lambda w, n: w.related(
+                predicate, position, tuple([n.get(a, a) for a in args])
+            )
         if kind is PredicateKind.STATIC:
             return 2, lambda w, n: w.static_related(
                 predicate, position, tuple([n.get(a, a) for a in args])
@@ -339,7 +339,7 @@ def schemas_of(domain: Domain) -> Schemas:
     found = domain.__dict__.get("_schemas")
     if found is None:
         found = domain.__dict__["_schemas"] = Schemas(domain)
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def bound_here(bound: frozenset[str], variables: Iterable[Parameter]) -> frozenset[str]:

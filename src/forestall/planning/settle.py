@@ -51,7 +51,7 @@ def watched_by(domain: Domain) -> list[frozenset[str]]:
             for p in domain.processes
         ]
         domain.__dict__["_watched"] = found
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _predicates(domain: Domain, formulas: list[Formula]) -> frozenset[str]:
