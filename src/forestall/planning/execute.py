@@ -43,6 +43,12 @@ def apply(state: State, subtask: Subtask) -> State | Refusal:
 
     Arguments may be category names; see `resolve`.
     """
+    done = perform(state, subtask)
+    return done if isinstance(done, Refusal) else done[0]
+
+
+def perform(state: State, subtask: Subtask) -> tuple[State, tuple[str, ...]] | Refusal:
+    """Execute one subtask, and say which instances its arguments meant."""
     after = state.copy()
     try:
         args = _resolved(after, subtask)
@@ -50,7 +56,7 @@ def apply(state: State, subtask: Subtask) -> State | Refusal:
     except _RefusedError as refused:
         return refused.refusal
     settle(after)
-    return after
+    return after, args
 
 
 def resolve(state: State, subtask: Subtask) -> tuple[str, ...] | Refusal:

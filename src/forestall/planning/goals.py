@@ -51,7 +51,9 @@ def makeable(state: State) -> Made:
             for row in reversed(rows):
                 kinds[row[0]] = row[1]
             sources = [x for x in state.kinds if state.kinds[x] in kinds]
-            for source in sorted(sources, key=lambda x: _promise(state, x)):
+            if len(sources) > 1:
+                sources.sort(key=lambda x: _promise(state, x))
+            for source in sources:
                 kind = kinds[state.kinds[source]]
                 count = make.count
                 if isinstance(count, str):

@@ -61,10 +61,8 @@ def narrowed(
     closure.keep(h for _, h in state.in_hands())
     closure.keep(x for x in also if x in state.kinds)
     parts = tuple(dict.fromkeys(p for goal in goals for p in goal))
-    for _ in range(2):
-        closure.visited.clear()
-        for part in parts:
-            closure.want(part)
+    for part in parts:
+        closure.want(part)
     chosen = _supports(state, closure.kept, closure.cleared)[:supports]
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
