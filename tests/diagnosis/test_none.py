@@ -13,7 +13,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Calibration, Decision, Replan, ReplanOutcome, Verdict
-from planning.corpus import PLANS, DOMAIN, home_of, scene
+from planning.corpus import DOMAIN, PLANS, home_of, scene
 from planning.episodes import context, seen
 
 ALARM = Verdict(Decision.REPLAN, "image", 0.5, 0.9, Calibration.FIXED)

@@ -2,11 +2,11 @@
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.domain.names import executable, ground_subtask
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
-from forestall.domain.load import shipped
 
 
 def at(name: str, category: str, x: float, **states: str) -> ObjectNode:

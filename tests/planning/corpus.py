@@ -12,7 +12,6 @@ from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.task import Goal
-from forestall.domain.load import shipped
 
 DOMAIN = shipped("household")
 _PREDICATES = {"on": "on_top_of", "in": "inside", "blocks": "blocking"}

@@ -17,7 +17,7 @@ from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Task
 from forestall.types.verdict import Reference
-from planning.corpus import GOALS, PLANS, DOMAIN, home_of, scene
+from planning.corpus import DOMAIN, GOALS, PLANS, home_of, scene
 
 _BOX = Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 OBSERVATION = Observation(

@@ -8,7 +8,7 @@ from forestall.planning.validate import GraphValidator, observed, run
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
-from planning.corpus import GOALS, PLANS, DOMAIN, goal, home_of, plan, scene
+from planning.corpus import DOMAIN, GOALS, PLANS, goal, home_of, plan, scene
 from planning.wrong_plans import WRONG, Wrong
 
 CHECK = GraphValidator(DOMAIN).check

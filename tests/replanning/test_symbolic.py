@@ -10,7 +10,7 @@ from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Plan
 from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome
-from planning.corpus import GOALS, PLANS, DOMAIN, home_of, plan, scene
+from planning.corpus import DOMAIN, GOALS, PLANS, home_of, plan, scene
 from planning.episodes import context
 
 VALIDATOR = GraphValidator(DOMAIN)

@@ -7,6 +7,7 @@ where the next step is at another place. What the plan makes gets the names that
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.problem import Operator, Problem
@@ -35,7 +36,7 @@ def gathered(problem: Problem, state: State, steps: list[Operator]) -> list[Oper
 
 def _drives(state: State, steps: Sequence[Operator]) -> int:
     places = [_at(state, s) for s in steps]
-    return sum(a != b for a, b in zip(places, places[1:], strict=False))
+    return sum(a != b for a, b in pairwise(places))
 
 
 def _at(state: State, step: Operator) -> str | None:

@@ -43,6 +43,12 @@ def apply(state: State, subtask: Subtask) -> State | Refusal:
 
     Arguments may be category names; see `resolve`.
     """
+    done = perform(state, subtask)
+    return done if isinstance(done, Refusal) else done[0]
+
+
+def perform(state: State, subtask: Subtask) -> tuple[State, tuple[str, ...]] | Refusal:
+    """Execute one subtask, and say which instances its arguments meant."""
     after = state.copy()
     try:
         args = _resolved(after, subtask)
@@ -50,7 +56,7 @@ def apply(state: State, subtask: Subtask) -> State | Refusal:
     except _RefusedError as refused:
         return refused.refusal
     settle(after)
-    return after
+    return after, args
 
 
 def resolve(state: State, subtask: Subtask) -> tuple[str, ...] | Refusal:
@@ -175,7 +181,7 @@ def _run(state: State, skill: Skill, args: tuple[str, ...]) -> None:
                 value = state.value(source, attribute)
                 if value is not None:
                     state.set_value(piece, attribute, value)
-    change(state, spread(skill.effects, made), names)
+    change(state, _spread(skill.effects, made), names)
     at = skill.at
     if at in made:
         state.at = made[at][0]
@@ -214,7 +220,7 @@ def _choose(
         raise _RefusedError(_said(state, choice.sentence, names, {}))
 
 
-def spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> Iterable[Effect]:
+def _spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> Iterable[Effect]:
     """Effects on made things once for each of them."""
     for effect in effects:
         used = [v for v in made if mentions(effect, v)]
@@ -233,6 +239,7 @@ def spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> It
 
 
 def mentions(effect: Effect, variable: str) -> bool:
+    """Whether an effect speaks of what a variable stands for."""
     return (
         variable in free(effect.condition)
         or any(variable in f.args for f in effect.facts)

@@ -1,7 +1,7 @@
 """Goals as ground conjunctions, and the names of things that skills could make.
 
-Called by `planner` and `replanning`; calls `state`. A goal with variables and category names becomes
-a list of ground alternatives of which any one meets it.
+Called by `planner` and `replanning`; calls `state`. A goal with variables and category names
+becomes a list of ground alternatives of which any one meets it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def makeable(state: State) -> Made:
 
     Every source gets names of its own, the most promising one the names that `apply` would give.
     """
-    domain, made, number = state.domain, {}, {}
+    domain = state.domain
+    made: dict[tuple[str, str, str], tuple[str, ...]] = {}
+    number: dict[str, int] = {}
     for skill in domain.skills.values():
         for make in skill.makes:
             rows = sorted(domain.statics.get(make.by, ()))
@@ -49,12 +51,14 @@ def makeable(state: State) -> Made:
             for row in reversed(rows):
                 kinds[row[0]] = row[1]
             sources = [x for x in state.kinds if state.kinds[x] in kinds]
-            for source in sorted(sources, key=lambda x: _promise(state, x)):
+            if len(sources) > 1:
+                sources.sort(key=lambda x: _promise(state, x))
+            for source in sources:
                 kind = kinds[state.kinds[source]]
                 count = make.count
                 if isinstance(count, str):
                     count = domain.number(source, count) or 1
-                names = []
+                names: list[str] = []
                 while len(names) < count:
                     number[kind] = number.get(kind, 0) + 1
                     if f"{kind}-{number[kind]}" not in state.kinds:

@@ -191,7 +191,7 @@ class _Grounding:
             other.family == skill.family
             and other is not skill
             and len(other.parameters) == len(skill.parameters)
-            and self._suited(other, dict(zip((p.name for p in other.parameters), names.values())))
+            and self._suited(other, _as(other, names))
             for other in self.domain.skills.values()
         )
 
@@ -260,7 +260,9 @@ class _Grounding:
     ) -> list[tuple[Names, Node, str | None]]:
         """Things that are chosen once the robot faces them."""
         g, variable = self.grounder, choice.variable.name
-        such = self.schemas.join((choice.variable,), choice.such_that, self.schemas.free(choice.such_that))
+        such = self.schemas.join(
+            (choice.variable,), choice.such_that, self.schemas.free(choice.such_that)
+        )
         found: list[tuple[Names, Node, str | None]] = []
         for bound, node in such(g, known):
             name = bound[variable]
@@ -321,7 +323,7 @@ class _Grounding:
             condition = self._condition(plan, known, nodes, made)
             if condition is False:
                 continue
-            over = over or g.driven
+            faced = over or g.driven
             changes = list(self._changes(skill.effects, bound, made))
             if made:
                 changes += self._births(skill, bound, made)
@@ -334,7 +336,7 @@ class _Grounding:
                 if part is not False
             ]
             pieces = tuple(p for several in made.values() for p in several)
-            yield Draft(subtask, condition, changes, prefers, over, pieces)
+            yield Draft(subtask, condition, changes, prefers, faced, pieces)
 
     def _condition(
         self, plan: _SkillPlan, names: Names, nodes: list[Node], made: Mapping[str, tuple[str, ...]]
@@ -371,7 +373,9 @@ class _Grounding:
                     if node is not False:
                         yield effect, known, node
                     continue
-                join = self.schemas.join(effect.variables, effect.condition, self.schemas.free(effect.condition))
+                join = self.schemas.join(
+                    effect.variables, effect.condition, self.schemas.free(effect.condition)
+                )
                 for bound, node in join(g, known):
                     yield effect, bound, node
 
@@ -467,6 +471,11 @@ class _Grounding:
             if changes:
                 found.append(Event(node, changes))
         return found
+
+
+def _as(skill: Skill, names: Names) -> Names:
+    """Arguments of another skill of the same family as those of this one."""
+    return {p.name: a for p, a in zip(skill.parameters, names.values(), strict=True)}
 
 
 def simple_needs(domain: Domain, skill: Skill) -> Formula:

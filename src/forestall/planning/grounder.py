@@ -195,9 +195,9 @@ class Grounder:
         atom = (predicate, *args)
         if atom in self.possible:
             return self.number_of(atom)
-        if self.domain.predicates[predicate].kind is PredicateKind.HISTORY:
-            if all(a in self.categories for a in args):
-                return self.number_of(atom)
+        history = self.domain.predicates[predicate].kind is PredicateKind.HISTORY
+        if history and all(a in self.categories for a in args):
+            return self.number_of(atom)
         return False
 
     def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:

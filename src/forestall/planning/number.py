@@ -160,7 +160,7 @@ class _Numbering:
             for d in self.grounding.drafts
             if any(f in relevant for c in d.changes for f in (*c.add, *c.delete))
         ]
-        events = [
+        happening = [
             [
                 e
                 for e in several
@@ -168,7 +168,7 @@ class _Numbering:
             ]
             for several in self.grounding.processes
         ]
-        return drafts, events, relevant
+        return drafts, happening, relevant
 
     def _bases(self, node: Node) -> frozenset[int]:
         """Base facts on which a node depends."""

@@ -7,8 +7,7 @@ Where the narrowed problem has no plan the planner takes `everything`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
 from forestall.domain.formula import (
@@ -19,33 +18,18 @@ from forestall.domain.formula import (
     Not,
     Or,
     Some,
-    free,
     normal,
 )
-from forestall.domain.model import Copy, Domain, Effect, PredicateKind, Process, Skill
-from forestall.planning.goals import Conjunction, Made, makeable
-from forestall.planning.ground import plain_parts, simple_needs
-from forestall.planning.grounder import Grounder, Universe
-from forestall.planning.nodes import Node
-from forestall.planning.schemas import schemas_of
+from forestall.domain.model import Copy, PredicateKind, Process, Skill
+from forestall.planning.goals import Conjunction, makeable
+from forestall.planning.grounder import Universe
+from forestall.planning.possible import Names, Possible, Way
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 DEPTH = 9
 GROUPS = 4
 """How many categories of things are tried for one open parameter."""
-
-Names = dict[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class _Way:
-    """A fact or a copy in an effect of a skill or a process."""
-
-    schema: Skill | Process
-    effect: Effect
-    what: Literal | Copy
-    simple: Formula
 
 
 def everything(state: State) -> Universe:
@@ -78,10 +62,8 @@ def narrowed(
     closure.keep(h for _, h in state.in_hands())
     closure.keep(x for x in also if x in state.kinds)
     parts = tuple(dict.fromkeys(p for goal in goals for p in goal))
-    for _ in range(2):
-        closure.visited.clear()
-        for part in parts:
-            closure.want(part)
+    for part in parts:
+        closure.want(part)
     chosen = _supports(state, closure.kept, closure.cleared)[:supports]
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
@@ -103,133 +85,13 @@ def _supports(state: State, kept: set[str], avoid: set[str]) -> list[str]:
     return [name for _, _, name in sorted(found)]
 
 
-class _Possible(Grounder):
-    """All things, with every relation that some skill could bring about (a `schemas.World`)."""
-
-    def __init__(self, state: State, made: Made) -> None:
-        things = tuple(sorted((x for x in state.kinds if x not in state.lost), key=by_number))
-        super().__init__(state, Universe(things, made), schemas_of(state.domain))
-        self.ways = _ways(state.domain)
-        self.source_of = {
-            n: (source, skill, variable)
-            for (source, skill, variable), names in made.items()
-            for n in names
-        }
-        self._can: dict[tuple[str, ...], bool] = {}
-        self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
-
-    def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
-        """A relation that holds or could be brought about."""
-        atom = (predicate, *args)
-        found = self._can.get(atom)
-        if found is None:
-            self._can[atom] = False
-            found = atom in self.state.facts or any(
-                True for way in self.ways.get(predicate, ()) for _ in self.bindings(way, atom)
-            )
-            self._can[atom] = found
-        return self.number_of(atom) if found else False
-
-    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
-        """What stands at a position or could be brought there."""
-        key = (predicate, position, *args[:position], *args[position + 1 :])
-        found = self._options.get(key)
-        if found is None:
-            self._options[key] = ()
-            names = dict.fromkeys(self.state.related(predicate, position, args))
-            atom = (predicate, *(a if i != position else "?" for i, a in enumerate(args)))
-            for way in self.ways.get(predicate, ()):
-                assert isinstance(way.what, Literal)
-                open_name = way.what.args[position]
-                for bound in self.bindings(way, atom):
-                    name = bound.get(open_name)
-                    if name is not None:
-                        names[name] = None
-            found = self._options[key] = tuple(names)
-        return found
-
-    def bindings(self, way: _Way, atom: tuple[str, ...]) -> Iterator[Names]:
-        """Bindings of a schema's parameters by which a way leads to a fact."""
-        names: Names = {}
-        args = way.what.args if isinstance(way.what, Literal) else (way.what.target,)
-        for variable, name in zip(args, atom[1:], strict=False):
-            if name.startswith("?"):
-                continue
-            if not variable.startswith("?"):
-                if variable != name:
-                    return
-            elif names.setdefault(variable, name) != name:
-                return
-        yield from self.completed(way, names)
-
-    def completed(self, way: _Way, names: Names) -> Iterator[Names]:
-        """Bindings of what is still open."""
-        schema = way.schema
-        if isinstance(schema, Skill):
-            for make in schema.makes:
-                piece = names.get(make.variable)
-                if piece is not None:
-                    source = self.source_of.get(piece)
-                    if source is None or source[1:] != (schema.name, make.variable):
-                        return
-                    if names.setdefault(make.source, source[0]) != source[0]:
-                        return
-            names = dict(names)
-            for make in schema.makes:
-                mine = self.universe.made.get((names.get(make.source, ""), schema.name, make.variable))
-                if mine and make.variable not in names:
-                    names[make.variable] = mine[0]
-        for parameter in schema.parameters:
-            name = names.get(parameter.name)
-            if name is not None and name not in self.categories:
-                return
-            if name is not None and parameter.kind and not self.is_a(name, parameter.kind):
-                return
-        left = tuple(p for p in schema.parameters if p.name not in names)
-        join = self.schemas.join(left, way.simple, frozenset(names) & self.schemas.free(way.simple))
-        for bound, _ in join(self, names):
-            yield from self._chosen(way, bound)
-
-    def _chosen(self, way: _Way, names: Names) -> Iterator[Names]:
-        schema, several = way.schema, [names]
-        for choice in schema.choices if isinstance(schema, Skill) else ():
-            variable = choice.variable.name
-            if variable in names:
-                continue
-            more = []
-            for known in several:
-                found = []
-                for formula in (*choice.among, choice.such_that):
-                    plain = plain_parts(self.domain, formula)
-                    if plain.parts and self.schemas.free(plain) - {variable} <= known.keys():
-                        join = self.schemas.join((choice.variable,), plain, frozenset(known))
-                        found = [{**known, variable: b[variable]} for b, _ in join(self, known)]
-                        if found:
-                            break
-                more += found or [known]
-            several = more
-        for known in several:
-            own = {v.name for v in way.effect.variables}
-            needed = self.schemas.free(way.effect.condition) - own
-            if needed <= known.keys():
-                condition = way.effect.condition
-                if own:
-                    open_now = tuple(v for v in way.effect.variables if v.name not in known)
-                    bound = frozenset(self.schemas.free(condition)) & frozenset(known)
-                    join = self.schemas.join(open_now, condition, bound)
-                    if any(True for _ in join(self, known)):
-                        yield known
-                elif self.schemas.formula(condition)(self, known) is not False:
-                    yield known
-
-
 class _Closure:
     """Collects what is needed, until nothing more is."""
 
     def __init__(self, state: State) -> None:
         self.state, self.domain = state, state.domain
         self.all_made = makeable(state)
-        self.world = _Possible(state, self.all_made)
+        self.world = Possible(state, self.all_made)
         self.schemas = self.world.schemas
         self.kept: set[str] = set()
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
@@ -283,16 +145,15 @@ class _Closure:
         literal = part.part if isinstance(part, Not) else part
         assert isinstance(literal, Literal)
         denied = isinstance(part, Not) or literal.value == "false"
-        if denied and evaluate(part, self.state, {}) == TRUE:
+        if denied and self.state.true(part):
             return
         known = self.domain.predicates.get(literal.predicate)
-        if known is not None and known.kind is PredicateKind.HISTORY:
-            if denied:
-                return
+        if known is not None and known.kind is PredicateKind.HISTORY and denied:
+            return
         for arg in literal.args:
             self.use(arg)
-        if literal.predicate in (self.domain.roles.unblocked, self.domain.roles.vacant):
-            self.cleared.update(a for a in literal.args if literal.predicate == self.domain.roles.unblocked)
+        if literal.predicate == self.domain.roles.unblocked:
+            self.cleared.update(literal.args)
         self.need(part, {}, 0, always=True)
 
     # --- needs -----------------------------------------------------------------------------------
@@ -301,10 +162,10 @@ class _Closure:
         """Keep what can make a formula true."""
         if depth > DEPTH or not self.schemas.free(formula) <= names.keys():
             return
-        if not always and evaluate(formula, self.state, names) == TRUE:
+        if always or not self.state.true(formula, names):
+            self._need(self.schemas.normal(formula), names, depth)
+        else:
             self._rely(normal(formula), names)
-            return
-        self._need(self.schemas.normal(formula), names, depth)
 
     def _rely(self, formula: Formula, names: Names) -> None:
         """Keep by what a formula is true: without its witnesses a narrowed problem denies it."""
@@ -338,25 +199,31 @@ class _Closure:
                 self.need(part, names, depth)
         elif isinstance(formula, Or):
             for part in formula.parts:
-                if self.world.schemas.formula(part)(self.world, names) is not False:
+                if self.schemas.formula(part)(self.world, names) is not False:
                     self.need(part, names, depth)
-        elif isinstance(formula, Some):
-            join = self.world.schemas.join(formula.variables, formula.part, self.schemas.free(formula))
+        elif isinstance(formula, Not):
+            self._differ(formula.part, names, depth)
+        else:
+            self._quantified(formula, names, depth)
+
+    def _quantified(self, formula: Some | Every | Fewer, names: Names, depth: int) -> None:
+        if isinstance(formula, Some):
+            join = self.schemas.join(formula.variables, formula.part, self.schemas.free(formula))
             found = [b for b, _ in join(self.world, names)]
             for bound in self._best(found, {v.name for v in formula.variables}):
                 self.need(formula.part, bound, depth + 1)
-        elif isinstance(formula, Every):
-            against = self.schemas.normal(formula.part, False)
-            for bound, truth in solutions(formula.variables, against, self.state, names):
-                if truth == TRUE:
-                    self.need(formula.part, bound, depth + 1)
-        elif isinstance(formula, Fewer):
-            denied = self.schemas.normal(formula.part, False)
-            for bound, truth in solutions((formula.variable,), formula.part, self.state, names):
-                if truth == TRUE:
-                    self._need(denied, bound, depth + 1)
-        elif isinstance(formula.part, Literal):
-            literal = formula.part.bind(names)
+            return
+        denied = self.schemas.normal(formula.part, False)
+        if isinstance(formula, Every):
+            variables, against, wanted = formula.variables, denied, formula.part
+        else:
+            variables, against, wanted = (formula.variable,), formula.part, denied
+        for bound in list(self.state.bindings(variables, against, names)):
+            self.need(wanted, bound, depth + 1)
+
+    def _differ(self, part: Formula, names: Names, depth: int) -> None:
+        if isinstance(part, Literal):
+            literal = part.bind(names)
             for value in self.domain.values(literal.predicate):
                 if value != literal.value:
                     self._achieve(Literal(literal.predicate, literal.args, value), depth)
@@ -413,12 +280,10 @@ class _Closure:
             return
         atom = (literal.predicate, *literal.args)
         for way in self.world.ways.get(literal.predicate, ()):
-            if isinstance(way.what, Literal) and known.kind is PredicateKind.ATTRIBUTE:
-                if way.what.value != literal.value:
-                    continue
-            self._follow(way, atom, literal, depth)
+            if isinstance(way.what, Copy) or way.what.value == literal.value:
+                self._follow(way, atom, literal, depth)
 
-    def _follow(self, way: _Way, atom: tuple[str, ...], literal: Literal, depth: int) -> None:
+    def _follow(self, way: Way, atom: tuple[str, ...], literal: Literal, depth: int) -> None:
         bound = set(way.what.args) if isinstance(way.what, Literal) else {way.what.target}
         new = {p.name for p in way.schema.parameters if p.name not in bound}
         conditions = [way.effect.condition] if not way.effect.variables else []
@@ -432,7 +297,11 @@ class _Closure:
             copy = way.what
             if _denied(conditions, copy, literal.value):
                 return
-            having = [b for b in found if self.state.value(b[copy.source], copy.attribute) == literal.value]
+            having = [
+                b
+                for b in found
+                if self.state.value(b[copy.source], copy.attribute) == literal.value
+            ]
             movable = self.domain.is_a(self.world.categories[atom[1]], self.domain.roles.movable)
             found = having if having or movable else found
         hand = way.schema.hand if isinstance(way.schema, Skill) else None
@@ -470,34 +339,3 @@ def _denied(conditions: Sequence[Formula], copy: Copy, value: str) -> bool:
     """Whether a skill that copies a value asks that the source does not have it."""
     banned = Literal(copy.attribute, (copy.source,), value)
     return any(isinstance(f, Not) and f.part == banned for f in conditions)
-
-
-def _ways(domain: Domain) -> dict[str, list[_Way]]:
-    """Predicate (with "not " for what ends it) → effects that are about it."""
-    found = domain.__dict__.get("_ways")
-    if found is not None:
-        return found  # type: ignore[no-any-return]
-    ways: dict[str, list[_Way]] = {}
-    able = domain.robot.skills or tuple(domain.skills)
-    seen: set[tuple[object, ...]] = set()
-    schemas: list[Skill | Process] = [domain.skills[s] for s in able]
-    for schema in [*schemas, *domain.processes]:
-        simple: Formula
-        if isinstance(schema, Skill):
-            simple = simple_needs(domain, schema)
-        else:
-            simple = schema.condition
-        if isinstance(schema, Skill) and schema.family:
-            like = (schema.family, schema.parameters, schema.needs, schema.effects)
-            if like in seen:
-                continue
-            seen.add(like)
-        for effect in schema.effects:
-            for fact in effect.facts:
-                name = f"not {fact.predicate}" if fact.value == "false" else fact.predicate
-                ways.setdefault(name, []).append(_Way(schema, effect, fact, simple))
-            for copy in effect.copies:
-                ways.setdefault(copy.attribute, []).append(_Way(schema, effect, copy, simple))
-    domain.__dict__["_ways"] = ways
-    return ways
-

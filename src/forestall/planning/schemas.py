@@ -339,7 +339,7 @@ def schemas_of(domain: Domain) -> Schemas:
     found = domain.__dict__.get("_schemas")
     if found is None:
         found = domain.__dict__["_schemas"] = Schemas(domain)
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def bound_here(bound: frozenset[str], variables: Iterable[Parameter]) -> frozenset[str]:

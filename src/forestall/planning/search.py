@@ -98,10 +98,9 @@ def _search(
                         heapq.heappush(everyone, item)
                         if index in liked:
                             heapq.heappush(helpful_only, item)
-        if expanded >= config.max_expansions:
-            return SearchOutcome.CUT_SHORT, [], expanded
-        if time.perf_counter() > deadline_s:
-            return SearchOutcome.TIMEOUT, [], expanded
+        over = _over(config, deadline_s, expanded)
+        if over is not None:
+            return over, [], expanded
         if helpful_only and (credit > 0 or not everyone or order % (BOOST + 1)):
             credit -= 1
             _, depth, _, before, via = heapq.heappop(helpful_only)
@@ -110,6 +109,12 @@ def _search(
         else:
             return SearchOutcome.UNSOLVABLE, [], expanded
         entry = (before, via, 0, depth + 1)
+
+
+def _over(config: SearchConfig, deadline_s: float, expanded: int) -> SearchOutcome | None:
+    if expanded >= config.max_expansions:
+        return SearchOutcome.CUT_SHORT
+    return SearchOutcome.TIMEOUT if time.perf_counter() > deadline_s else None
 
 
 def _path(parents: dict[int, tuple[int, int, int]], state: int) -> list[int]:

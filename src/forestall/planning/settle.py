@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from forestall.domain.formula import Formula, literals
+from forestall.domain.formula import TRUE, Formula, literals
 from forestall.domain.model import Domain, Effect
 from forestall.errors import DomainError
 from forestall.planning.state import State
@@ -51,7 +51,7 @@ def watched_by(domain: Domain) -> list[frozenset[str]]:
             for p in domain.processes
         ]
         domain.__dict__["_watched"] = found
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _predicates(domain: Domain, formulas: list[Formula]) -> frozenset[str]:
@@ -73,6 +73,12 @@ def change(state: State, effects: Iterable[Effect], names: dict[str, str]) -> No
     copies: list[tuple[str, str, str]] = []
     gone: list[str] = []
     for effect in effects:
+        if effect.variables and effect.condition == TRUE and not (effect.copies or effect.gone):
+            ended = [f for f in effect.facts if f.value == "false"]
+            if len(ended) == len(effect.facts):
+                for fact in ended:
+                    add += state.matching(fact.bind(names))
+                continue
         if effect.variables:
             found = list(state.bindings(effect.variables, effect.condition, names))
         else:

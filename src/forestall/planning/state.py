@@ -253,6 +253,18 @@ class State:
         values = self.values
         return [n for n in self.of_kind(f"has_{attribute}") if values[n, attribute] == value]
 
+    def matching(self, pattern: Literal) -> list[Literal]:
+        """Literals like a pattern, variables standing for anything, of facts that hold."""
+        given = next((i for i, a in enumerate(pattern.args) if not a.startswith("?")), None)
+        key = (pattern.predicate, given or 0, pattern.args[given] if given is not None else "")
+        found = self.facts if given is None else self._index.get(key, ())
+        return [
+            Literal(f[0], f[1:], pattern.value)
+            for f in found
+            if f[0] == pattern.predicate
+            and all(a.startswith("?") or a == b for a, b in zip(pattern.args, f[1:], strict=True))
+        ]
+
     # --- questions -------------------------------------------------------------------------------
 
     def kind(self, name: str) -> Category:

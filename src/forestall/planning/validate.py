@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import islice, product
 
 from forestall.domain.model import LOCATED, Domain
-from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.execute import Refusal, perform
 from forestall.planning.settle import settle
 from forestall.planning.state import State, decided
 from forestall.types.facts import Literal, category_of
@@ -83,11 +83,10 @@ def run(state: State, subtasks: Iterable[Subtask]) -> Trace:
     meant: list[Subtask] = []
     for step, subtask in enumerate(subtasks):
         before = states[-1]
-        args = resolve(before, subtask)
-        after = args if isinstance(args, Refusal) else apply(before, subtask)
-        if isinstance(after, Refusal):
-            return Trace(tuple(states), step, after, frozenset(touched), tuple(meant))
-        assert not isinstance(args, Refusal)
+        done = perform(before, subtask)
+        if isinstance(done, Refusal):
+            return Trace(tuple(states), step, done, frozenset(touched), tuple(meant))
+        after, args = done
         for name in args:
             touched.update((name, *(p.parent for p in before.chain(name))))
         meant.append(Subtask(subtask.skill, args))

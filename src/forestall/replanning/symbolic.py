@@ -272,7 +272,7 @@ def _left_running(state: State, planned: Planned, facts: Sequence[Literal]) -> l
 
 def _running(domain: Domain) -> list[tuple[str, str]]:
     """Values, other than the default, that let a process go on: that a device is on."""
-    found = {}
+    found: dict[tuple[str, str], None] = {}
     for process in domain.processes:
         changed = {f.args[0] for e in process.effects for f in e.facts if f.args}
         for literal, positive in literals(process.condition):

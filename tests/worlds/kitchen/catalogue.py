@@ -14,7 +14,7 @@ from typing import Any
 from mutants import Mutant
 
 from forestall.domain.model import Domain
-from forestall.worlds.kitchen.catalogue import Catalogue, Category, Receptacle, shipped_catalogue
+from forestall.worlds.kitchen.catalogue import Catalogue, Category, Receptacle
 from forestall.worlds.kitchen.skills import KNIFE
 
 

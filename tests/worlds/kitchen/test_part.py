@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from forestall.domain.load import shipped
 from forestall.errors import UnknownNameError
 from forestall.types.scene import SceneNeeds
-from forestall.domain.load import shipped
 from forestall.worlds.kitchen import part
 from forestall.worlds.kitchen.part import Kitchens
 

@@ -1,0 +1,181 @@
+"""What some skill or process could bring about, one step back: ways to a fact.
+
+Called by `relevance`; calls `schemas`. Only what never changes is judged, so nothing that can be
+brought about is missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from forestall.domain.evaluate import by_number
+from forestall.domain.formula import Formula
+from forestall.domain.model import Copy, Domain, Effect, Process, Skill
+from forestall.planning.goals import Made
+from forestall.planning.ground import plain_parts, simple_needs
+from forestall.planning.grounder import Grounder, Universe
+from forestall.planning.nodes import Node
+from forestall.planning.schemas import schemas_of
+from forestall.planning.state import State
+from forestall.types.facts import Literal
+
+Names = dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A fact or a copy in an effect of a skill or a process."""
+
+    schema: Skill | Process
+    effect: Effect
+    what: Literal | Copy
+    simple: Formula
+
+
+class Possible(Grounder):
+    """All things, with every relation that some skill could bring about (a `schemas.World`)."""
+
+    def __init__(self, state: State, made: Made) -> None:
+        things = tuple(sorted((x for x in state.kinds if x not in state.lost), key=by_number))
+        super().__init__(state, Universe(things, made), schemas_of(state.domain))
+        self.ways = ways_of(state.domain)
+        self.source_of = {
+            n: (source, skill, variable)
+            for (source, skill, variable), names in made.items()
+            for n in names
+        }
+        self._can: dict[tuple[str, ...], bool] = {}
+        self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
+
+    def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
+        """A relation that holds or could be brought about."""
+        atom = (predicate, *args)
+        found = self._can.get(atom)
+        if found is None:
+            self._can[atom] = False
+            found = atom in self.state.facts or any(
+                True for way in self.ways.get(predicate, ()) for _ in self.bindings(way, atom)
+            )
+            self._can[atom] = found
+        return self.number_of(atom) if found else False
+
+    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
+        """What stands at a position or could be brought there."""
+        key = (predicate, position, *args[:position], *args[position + 1 :])
+        found = self._options.get(key)
+        if found is None:
+            self._options[key] = ()
+            names = dict.fromkeys(self.state.related(predicate, position, args))
+            atom = (predicate, *(a if i != position else "?" for i, a in enumerate(args)))
+            for way in self.ways.get(predicate, ()):
+                assert isinstance(way.what, Literal)
+                open_name = way.what.args[position]
+                for bound in self.bindings(way, atom):
+                    name = bound.get(open_name)
+                    if name is not None:
+                        names[name] = None
+            found = self._options[key] = tuple(names)
+        return found
+
+    def bindings(self, way: Way, atom: tuple[str, ...]) -> Iterator[Names]:
+        """Bindings of a schema's parameters by which a way leads to a fact."""
+        names: Names = {}
+        args = way.what.args if isinstance(way.what, Literal) else (way.what.target,)
+        for variable, name in zip(args, atom[1:], strict=False):
+            if name.startswith("?"):
+                continue
+            if not variable.startswith("?"):
+                if variable != name:
+                    return
+            elif names.setdefault(variable, name) != name:
+                return
+        yield from self.completed(way, names)
+
+    def completed(self, way: Way, names: Names) -> Iterator[Names]:
+        """Bindings of what is still open."""
+        schema = way.schema
+        if isinstance(schema, Skill):
+            for make in schema.makes:
+                piece = names.get(make.variable)
+                if piece is not None:
+                    source = self.source_of.get(piece)
+                    if source is None or source[1:] != (schema.name, make.variable):
+                        return
+                    if names.setdefault(make.source, source[0]) != source[0]:
+                        return
+            names = dict(names)
+            for make in schema.makes:
+                mine = self.universe.made.get(
+                    (names.get(make.source, ""), schema.name, make.variable)
+                )
+                if mine and make.variable not in names:
+                    names[make.variable] = mine[0]
+        for parameter in schema.parameters:
+            name = names.get(parameter.name)
+            if name is not None and name not in self.categories:
+                return
+            if name is not None and parameter.kind and not self.is_a(name, parameter.kind):
+                return
+        left = tuple(p for p in schema.parameters if p.name not in names)
+        join = self.schemas.join(left, way.simple, frozenset(names) & self.schemas.free(way.simple))
+        for bound, _ in join(self, names):
+            yield from self._chosen(way, bound)
+
+    def _chosen(self, way: Way, names: Names) -> Iterator[Names]:
+        schema, several = way.schema, [names]
+        for choice in schema.choices if isinstance(schema, Skill) else ():
+            variable = choice.variable.name
+            if variable in names:
+                continue
+            more = []
+            for known in several:
+                found = []
+                for formula in (*choice.among, choice.such_that):
+                    plain = plain_parts(self.domain, formula)
+                    if plain.parts and self.schemas.free(plain) - {variable} <= known.keys():
+                        join = self.schemas.join((choice.variable,), plain, frozenset(known))
+                        found = [{**known, variable: b[variable]} for b, _ in join(self, known)]
+                        if found:
+                            break
+                more += found or [known]
+            several = more
+        for known in several:
+            own = {v.name for v in way.effect.variables}
+            needed = self.schemas.free(way.effect.condition) - own
+            if needed <= known.keys():
+                condition = way.effect.condition
+                if own:
+                    open_now = tuple(v for v in way.effect.variables if v.name not in known)
+                    bound = frozenset(self.schemas.free(condition)) & frozenset(known)
+                    join = self.schemas.join(open_now, condition, bound)
+                    if any(True for _ in join(self, known)):
+                        yield known
+                elif self.schemas.formula(condition)(self, known) is not False:
+                    yield known
+
+
+def ways_of(domain: Domain) -> dict[str, list[Way]]:
+    """Predicate (with "not " for what ends it) → effects that are about it."""
+    found = domain.__dict__.get("_ways")
+    if found is not None:
+        return found  # type: ignore[no-any-return]
+    ways: dict[str, list[Way]] = {}
+    able = domain.robot.skills or tuple(domain.skills)
+    seen: set[tuple[object, ...]] = set()
+    schemas: list[Skill | Process] = [domain.skills[s] for s in able]
+    for schema in [*schemas, *domain.processes]:
+        simple = simple_needs(domain, schema) if isinstance(schema, Skill) else schema.condition
+        if isinstance(schema, Skill) and schema.family:
+            like = (schema.family, schema.parameters, schema.needs, schema.effects)
+            if like in seen:
+                continue
+            seen.add(like)
+        for effect in schema.effects:
+            for fact in effect.facts:
+                name = f"not {fact.predicate}" if fact.value == "false" else fact.predicate
+                ways.setdefault(name, []).append(Way(schema, effect, fact, simple))
+            for copy in effect.copies:
+                ways.setdefault(copy.attribute, []).append(Way(schema, effect, copy, simple))
+    domain.__dict__["_ways"] = ways
+    return ways
