@@ -1,8 +1,8 @@
 """No engine package holds a name of a shipped domain: no verb, category, attribute, value, tag.
 
 Names that geometry itself uses (inside, on top of, left of, ...) are perception's own words, so
-that relations count only outside of it. Checked are whole strings in the code, the way a domain's name
-would be used; a docstring may explain itself with a mug.
+that relations count only outside of it. Checked are whole strings in the code, the way a domain's
+name would be used; a docstring may explain itself with a mug.
 """
 
 import ast

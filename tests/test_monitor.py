@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from forestall.assembly.configuration import run_config
 from forestall.assembly.make import make_strategy
 from forestall.conclusion import MonitorConfig
 from forestall.domain.load import shipped

@@ -47,7 +47,7 @@ def scene(*texts: str) -> SceneGraph:
             case ["hidden"]:
                 hidden.add(words[0])
             case ["is", value]:
-                attribute = next(a for a, v in ATTRIBUTES.items() if value in v)
+                attribute = next(a for a, p in DOMAIN.attributes.items() if value in p.values)
                 states[words[0]][attribute] = value
             case ["unseen", attribute]:
                 states[words[0]][attribute] = None
