@@ -395,5 +395,5 @@ def test_the_real_strategy_on_graphs_of_the_callers_own() -> None:
             assert decision.diagnosis is not None and "Bowl-1" in decision.diagnosis.cause
     assert outcomes.count(Outcome.REPLAN) == 1
     assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in monitor.executed)
-    strict, _, why = TruthGoalChecker().check(loaded.task.goal, kitchen.oracle)
+    strict, _, why = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
     assert strict, why

@@ -204,7 +204,7 @@ class Forgetful(TruthPerceiver):
 
     def perceive(self, observation: Observation) -> SceneGraph:
         graph = super().perceive(observation)
-        if "Floor-1" not in graph.parents("Mug-1"):
+        if "Floor-1" not in graph.parents("Mug-1", ("inside", "on_top_of")):
             return graph
         return SceneGraph(
             tuple(

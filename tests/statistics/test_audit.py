@@ -56,8 +56,8 @@ def judged(record: dict[str, Any]) -> tuple[bool, bool | None, tuple[str, ...], 
     for step in record["steps"]:
         faulty.execute(Subtask.parse(step))
     goal = loaded.task.goal
-    strict, weak, failures = TruthGoalChecker().check(goal, kitchen.oracle)
-    return strict, weak, failures, bool(irreversible(goal, kitchen.oracle))
+    strict, weak, failures = TruthGoalChecker(loaded.domain).check(goal, kitchen.oracle)
+    return strict, weak, failures, bool(irreversible(goal, kitchen.oracle, loaded.domain))
 
 
 @pytest.mark.parametrize("record", RECORDS, ids=lambda r: r["id"])
