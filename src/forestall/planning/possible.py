@@ -51,6 +51,8 @@ class Possible(Grounder):
     def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
         """A relation that holds or could be brought about."""
         atom = (predicate, *args)
+        if predicate in self.rigid:
+            return atom in self.state.facts
         found = self._can.get(atom)
         if found is None:
             self._can[atom] = False

@@ -251,6 +251,8 @@ class _Closure:
         if literal.value == "false":
             self._end(literal, depth)
             return
+        if known.contains:
+            self.use(literal.args[0])
         atom = (literal.predicate, *literal.args)
         for way in self.world.ways.get(literal.predicate, ()):
             if isinstance(way.what, Copy) or way.what.value == literal.value:
