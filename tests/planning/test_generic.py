@@ -1,4 +1,4 @@
-"""Planning in a domain without anything of the household: types, quantifiers, counts, new things."""
+"""Planning in a domain of another kind: types, quantifiers, counts, processes, new things."""
 
 from __future__ import annotations
 
