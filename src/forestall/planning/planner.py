@@ -165,16 +165,12 @@ def pose(
     return number(_grounding(state, kept), state, goals.conjunctions, not whole)
 
 
-_groundings: OrderedDict[tuple[object, ...], Grounding] = OrderedDict()
-
-
 def _grounding(state: State, kept: Universe, deadline_s: float = inf) -> Grounding:
     """What can happen among the kept things; the several searches of one replanning share it."""
     known = frozenset(kept.things)
     hands = state.domain.robot.hands
     facts = frozenset(f for f in state.facts if all(a in known or a in hands for a in f[1:]))
     key = (
-        id(state.domain),
         tuple((x, state.kinds[x]) for x in kept.things),
         tuple(sorted(state.kinds.items())),
         facts,
@@ -183,12 +179,14 @@ def _grounding(state: State, kept: Universe, deadline_s: float = inf) -> Groundi
         kept.purposeful,
         kept.supports,
     )
-    found = _groundings.get(key)
+    recent = state.domain.__dict__.setdefault("_groundings", OrderedDict())
+    found = recent.get(key)
     if found is None:
-        found = _groundings[key] = ground(state, kept, deadline_s)
-        if len(_groundings) > _RECENT:
-            _groundings.popitem(last=False)
-    return found
+        found = recent[key] = ground(state, kept, deadline_s)
+        if len(recent) > _RECENT:
+            recent.popitem(last=False)
+    known: Grounding = found
+    return known
 
 
 def _anywhere(state: State, category: str) -> bool:
