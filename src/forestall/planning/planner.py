@@ -185,8 +185,7 @@ def _grounding(state: State, kept: Universe, deadline_s: float = inf) -> Groundi
         found = recent[key] = ground(state, kept, deadline_s)
         if len(recent) > _RECENT:
             recent.popitem(last=False)
-    known: Grounding = found
-    return known
+    return found  # type: ignore[no-any-return]
 
 
 def _anywhere(state: State, category: str) -> bool:

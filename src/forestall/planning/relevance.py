@@ -22,7 +22,7 @@ from forestall.domain.formula import (
 from forestall.domain.model import Copy, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, makeable
 from forestall.planning.grounder import Universe
-from forestall.planning.possible import Names, Possible, Way
+from forestall.planning.possible import Names, Way, possible
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
@@ -90,7 +90,7 @@ class _Closure:
     def __init__(self, state: State) -> None:
         self.state, self.domain = state, state.domain
         self.all_made = makeable(state)
-        self.world = Possible(state, self.all_made)
+        self.world = possible(state, self.all_made)
         self.schemas = self.world.schemas
         self.kept: set[str] = set()
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}

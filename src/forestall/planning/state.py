@@ -53,8 +53,8 @@ class State:
     """
 
     __slots__ = (
-        "_asked", "_done", "_index", "_kind_index", "assumed", "at", "changed", "crowded", "domain", "facts",
-        "hidden", "kinds", "lost", "values",
+        "_asked", "_done", "_index", "_kind_index", "assumed", "at", "changed", "crowded", "domain",
+        "facts", "hidden", "kinds", "lost", "values",
     )  # fmt: skip
 
     def __init__(
