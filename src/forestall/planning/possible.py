@@ -48,6 +48,7 @@ class Possible(Grounder):
             for n in names
         }
         self._can: dict[tuple[str, ...], bool] = {}
+        self._bindings: dict[tuple[int, tuple[str, ...]], tuple[Names, ...]] = {}
         self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
 
     def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
@@ -83,6 +84,13 @@ class Possible(Grounder):
             found = self._options[key] = tuple(names)
         now = [x for x in self.state.related(predicate, position, args) if x not in found]
         return (*now, *found)
+
+    def known_bindings(self, way: Way, atom: tuple[str, ...]) -> Sequence[Names]:
+        """The bindings of `bindings`, worked out once."""
+        key = (id(way), atom)
+        if key not in self._bindings:
+            self._bindings[key] = tuple(self.bindings(way, atom))
+        return self._bindings[key]
 
     def bindings(self, way: Way, atom: tuple[str, ...]) -> Iterator[Names]:
         """Bindings of a schema's parameters by which a way leads to a fact."""

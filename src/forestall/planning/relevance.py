@@ -97,7 +97,6 @@ class _Closure:
         self.purposeful: set[str] = set()
         self.cleared: set[str] = set()
         self.visited: set[tuple[object, ...]] = set()
-        self._eases: dict[str, tuple[object, ...]] = {}
 
     def keep(self, names: Iterable[str]) -> None:
         """Keep things, with what has them, what blocks them, and what fills a limited place."""
@@ -216,9 +215,7 @@ class _Closure:
         return best[:most]
 
     def _ease(self, name: str) -> tuple[object, ...]:
-        rest = self._eases.get(name)
-        if rest is None:
-            rest = self._eases[name] = self._judged(name)
+        rest = self.state.follow(("ease", name), lambda: self._judged(name))
         return (rest[0], name not in self.kept, *rest[1:])
 
     def _judged(self, name: str) -> tuple[object, ...]:
@@ -267,7 +264,7 @@ class _Closure:
         else:
             conditions += [n.formula for n in way.schema.needs]
             new |= {c.variable.name for c in way.schema.choices}
-        found = list(self.world.bindings(way, atom))
+        found = list(self.world.known_bindings(way, atom))
         if isinstance(way.what, Copy):
             copy = way.what
             if _denied(conditions, copy, literal.value):
