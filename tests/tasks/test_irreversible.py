@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from forestall.domain.load import domain_of
 from forestall.planning.planner import Planned, plan_goal
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import observed
@@ -62,7 +63,7 @@ class Run:
         )
 
     def planned(self) -> Planned:
-        truth = observed(self.kitchen.oracle.truth(), self.loaded.domain)
+        truth = observed(self.kitchen.oracle.truth(), domain_of(self.loaded.vocabulary))
         return plan_goal(truth, self.loaded.task.goal, QUICK)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
 from typing import Protocol, TypeVar
 
 from forestall.domain.formula import (
@@ -224,6 +225,7 @@ def number_of(name: str) -> int:
     return int(name.rpartition("-")[2]) if is_instance(name) else 1
 
 
+@lru_cache(maxsize=4096)
 def by_number(name: str) -> tuple[str, int]:
     """Sort key: category first, then number ("Mug-2" before "Mug-10")."""
     return category_of(name), number_of(name)

@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 class Asked:
     """Implements `schemas.World` over one state."""
 
-    __slots__ = ("domain", "schemas", "state")
+    __slots__ = ("_kinds", "domain", "schemas", "state")
 
     def __init__(self, state: State) -> None:
         self.state, self.domain = state, state.domain
         self.schemas = schemas_of(state.domain)
+        self._kinds = state.kinds
 
     def things(self) -> Sequence[str]:
         """Every thing."""
@@ -35,7 +36,7 @@ class Asked:
 
     def is_a(self, name: str, kind: str) -> bool:
         """Whether a thing counts as a kind."""
-        return kind in self.domain.kinds(self.state.category(name))
+        return kind in self.domain.kinds(self._kinds.get(name) or self.state.category(name))
 
     def same_category(self, one: str, other: str) -> bool:
         """Whether two things are of one category."""

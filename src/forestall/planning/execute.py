@@ -49,6 +49,10 @@ def apply(state: State, subtask: Subtask) -> State | Refusal:
 
 def perform(state: State, subtask: Subtask) -> tuple[State, tuple[str, ...]] | Refusal:
     """Execute one subtask, and say which instances its arguments meant."""
+    return state.follow(subtask, lambda: _performed(state, subtask))
+
+
+def _performed(state: State, subtask: Subtask) -> tuple[State, tuple[str, ...]] | Refusal:
     after = state.copy()
     try:
         args = _resolved(after, subtask)

@@ -148,6 +148,7 @@ class _Options:
         self.state, self.whole = state, whole
         self.made = makeable(state)
         self.first: dict[str, tuple[str, ...]] = {}
+        self.every: set[str] = set()
         for names in self.made.values():
             kind = category_of(names[0]) if names else ""
             known = self.first.get(kind)
@@ -157,7 +158,7 @@ class _Options:
         """Whether an argument means one thing."""
         if arg in self.state.domain.robot.hands or arg.startswith("?") or arg in self.state.kinds:
             return True
-        return is_instance(arg) and not self.first.get(category_of(arg))
+        return is_instance(arg) and (arg in self.every or not self.first.get(category_of(arg)))
 
     def possible(self, name: str) -> tuple[str, ...]:
         """Things that exist and are located, and those that could be made."""
@@ -182,6 +183,7 @@ class _Options:
             for a in literal.args
         ]
         for args in product(*choices):
+            self.every.update(a for a in args if a not in literal.args)
             changed = Literal(literal.predicate, args, literal.value)
             yield Not(changed) if isinstance(part, Not) else changed
 

@@ -6,8 +6,10 @@ parts of needs alone; then every skill that can run becomes a draft, which `numb
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import And, Formula, Not, Some, free, literals, normal
@@ -76,13 +78,22 @@ class _SkillPlan:
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
 
 
-def ground(state: State, universe: Universe) -> Grounding:
-    """Ground everything that can happen."""
-    return _Grounding(state, universe).run()
+class TooLargeError(Exception):
+    """Grounding took longer than it may."""
+
+
+def ground(state: State, universe: Universe, deadline_s: float = inf) -> Grounding:
+    """Ground everything that can happen.
+
+    Raises:
+        TooLargeError: it is not done by a time of `time.perf_counter`.
+    """
+    return _Grounding(state, universe, deadline_s).run()
 
 
 class _Grounding:
-    def __init__(self, state: State, universe: Universe) -> None:
+    def __init__(self, state: State, universe: Universe, deadline_s: float) -> None:
+        self.deadline_s = deadline_s
         self.domain = state.domain
         self.schemas = schemas_of(state.domain)
         self.grounder = Grounder(state, universe, self.schemas)
@@ -172,12 +183,17 @@ class _Grounding:
         join = self.schemas.join(skill.parameters, plan.simple, frozenset())
         order = [p.name for p in skill.parameters]
         for found, _ in join(self.grounder, {}):
+            self._in_time()
             names = {v: found[v] for v in order}
             if skill.makes and not self._makes_known(skill, names):
                 continue
             if skill.family and self._other_fits_better(skill, names):
                 continue
             yield names
+
+    def _in_time(self) -> None:
+        if time.perf_counter() > self.deadline_s:
+            raise TooLargeError
 
     def _makes_known(self, skill: Skill, names: Names) -> bool:
         made = self.universe.made
@@ -306,6 +322,7 @@ class _Grounding:
     # --- drafts ----------------------------------------------------------------------------------
 
     def _drafts(self, plan: _SkillPlan, names: Names) -> Iterator[Draft]:
+        self._in_time()
         g, skill = self.grounder, plan.skill
         made = self._made(skill, names)
         first = {v: pieces[0] for v, pieces in made.items()}
@@ -467,6 +484,7 @@ class _Grounding:
         join = self.schemas.join(process.parameters, process.condition, frozenset())
         found = []
         for names, node in join(self.grounder, {}):
+            self._in_time()
             changes = list(self._changes(process.effects, names, {}))
             if changes:
                 found.append(Event(node, changes))

@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from forestall.domain.evaluate import static_holds
-from forestall.domain.model import Domain, PredicateKind
+from forestall.domain.formula import TRUE, literals
+from forestall.domain.model import SAME, SAME_CATEGORY, Domain, PredicateKind
 from forestall.planning.nodes import Junction, Node, all_of, assuming
 from forestall.planning.problem import Atom
 from forestall.planning.schemas import Schemas
@@ -45,7 +46,59 @@ class Universe:
             return True
         if place not in self.purposeful and any(domain.is_a(place, t) for t in domain.roles.avoid):
             return False
+        if not domain.roles.rest:
+            return True
         return thing in self.purposeful or place in self.supports
+
+
+def rigid_of(domain: Domain) -> frozenset[str]:
+    """Relations that nothing changes, and what is derived of such alone: true of the scene."""
+    found = domain.__dict__.get("_rigid")
+    if found is None:
+        effects = [e for s in domain.skills.values() for e in s.effects]
+        effects += [e for p in domain.processes for e in p.effects]
+        changed = {f.predicate for e in effects for f in e.facts}
+        groups = {domain.predicates[c].group for c in changed} - {None}
+        gone = any(e.gone for e in effects) or any(s.makes for s in domain.skills.values())
+        rigid = {
+            r.name
+            for r in domain.relations.values()
+            if r.name not in changed and r.group not in groups
+        }
+        static = set(domain.statics) | {SAME, SAME_CATEGORY, *domain.tags, *domain.categories}
+        news = True
+        while news:
+            news = False
+            for known in domain.derived.values():
+                asks = {x.predicate for x, _ in literals(known.definition or TRUE)}
+                if known.name not in rigid and asks <= rigid | static | {known.name}:
+                    rigid.add(known.name)
+                    news = True
+        kept = rigid if not gone else {r for r in rigid if _untouched(domain, r)}
+        found = domain.__dict__["_rigid"] = frozenset(kept)
+    return found
+
+
+def _untouched(domain: Domain, name: str) -> bool:
+    """Whether nothing that is made or goes can stand in a relation: its roles say of what kind."""
+    passing: set[str] = set()
+    for skill in domain.skills.values():
+        kinds = {p.name: p.kind for p in skill.parameters}
+        for variable in (
+            *(v for e in skill.effects for v in e.gone),
+            *(m.source for m in skill.makes),
+        ):
+            passing |= (
+                set(domain.categories)
+                if kinds.get(variable) is None
+                else {c for c in domain.categories if kinds[variable] in domain.kinds(c)}
+            )
+        for make in skill.makes:
+            passing |= {row[1] for row in domain.statics.get(make.by, ())}
+    roles = domain.predicates[name].parameters
+    return all(
+        p.kind is not None and not any(p.kind in domain.kinds(c) for c in passing) for p in roles
+    )
 
 
 class Grounder:
@@ -60,6 +113,7 @@ class Grounder:
         for hand in self.domain.robot.hands:
             self.categories[hand] = hand
         self.maybe: set[str] = set(made)
+        self.rigid = rigid_of(self.domain)
         self.facing: str | None = None
         self.driven: str | None = None
         self.atoms: list[Atom] = [("",)] * _FIRST
@@ -193,6 +247,8 @@ class Grounder:
     def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
         """A relation or history."""
         atom = (predicate, *args)
+        if predicate in self.rigid:
+            return atom in self.state.facts
         if atom in self.possible:
             return self.number_of(atom)
         history = self.domain.predicates[predicate].kind is PredicateKind.HISTORY
@@ -219,6 +275,8 @@ class Grounder:
         found = self._derived.get(atom)
         if found is not None:
             return found
+        if predicate in self.rigid:
+            return self.state.says(predicate, *args)
         known = self.domain.predicates[predicate]
         assert known.definition is not None
         number = self._derived[atom] = self.number_of(atom)

@@ -10,6 +10,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 from forestall.planning.driving import gathered, with_driving
 from forestall.planning.goals import (
@@ -19,7 +20,7 @@ from forestall.planning.goals import (
     negated,
     shown,
 )
-from forestall.planning.ground import Grounding, ground
+from forestall.planning.ground import Grounding, TooLargeError, ground
 from forestall.planning.grounder import Universe
 from forestall.planning.number import UnsupportedError, number
 from forestall.planning.problem import Problem
@@ -39,6 +40,8 @@ OUTCOMES = {
 }
 
 _RECENT = 16
+SHORTEST_S = 0.2
+"""Grounding is given at least so long, whatever the time limit of the search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +106,15 @@ def _attempt(
     state: State, goals: Alternatives, kept: Universe, config: SearchConfig, careful: bool
 ) -> Planned:
     start_s = time.perf_counter()
+    deadline_s = start_s + max(config.time_limit_s, SHORTEST_S)
     try:
-        problem = number(_grounding(state, kept), state, goals.conjunctions, careful)
+        grounding = _grounding(state, kept, deadline_s)
+        problem = number(grounding, state, goals.conjunctions, careful)
     except UnsupportedError as error:
         return Planned(ReplanOutcome.UNSUPPORTED, note=str(error))
+    except TooLargeError:
+        note = f"{len(kept.things)} things are too many for the time"
+        return Planned(ReplanOutcome.TIMEOUT, note=note)
     found = solve(problem, config)
     outcome = OUTCOMES[found.outcome]
     subtasks: tuple[Subtask, ...] = ()
@@ -129,6 +137,8 @@ def _attempt(
 def plan_goal(state: State, goal: Goal, config: SearchConfig | None = None) -> Planned:
     """Plan from a state to a task's goal, whatever binding of its variables is nearest."""
     goals = alternatives(state, goal)
+    if not goals.conjunctions:
+        goals = alternatives(state, goal, whole=True)
     if not goals.conjunctions:
         missing = [c for _, c in goal.variables if not _anywhere(state, c)]
         missing += [a for x in goal.literals for a in x.args if _nowhere(state, a)]
@@ -155,16 +165,12 @@ def pose(
     return number(_grounding(state, kept), state, goals.conjunctions, not whole)
 
 
-_groundings: OrderedDict[tuple[object, ...], Grounding] = OrderedDict()
-
-
-def _grounding(state: State, kept: Universe) -> Grounding:
+def _grounding(state: State, kept: Universe, deadline_s: float = inf) -> Grounding:
     """What can happen among the kept things; the several searches of one replanning share it."""
     known = frozenset(kept.things)
     hands = state.domain.robot.hands
     facts = frozenset(f for f in state.facts if all(a in known or a in hands for a in f[1:]))
     key = (
-        id(state.domain),
         tuple((x, state.kinds[x]) for x in kept.things),
         tuple(sorted(state.kinds.items())),
         facts,
@@ -173,12 +179,13 @@ def _grounding(state: State, kept: Universe) -> Grounding:
         kept.purposeful,
         kept.supports,
     )
-    found = _groundings.get(key)
+    recent = state.domain.__dict__.setdefault("_groundings", OrderedDict())
+    found = recent.get(key)
     if found is None:
-        found = _groundings[key] = ground(state, kept)
-        if len(_groundings) > _RECENT:
-            _groundings.popitem(last=False)
-    return found
+        found = recent[key] = ground(state, kept, deadline_s)
+        if len(recent) > _RECENT:
+            recent.popitem(last=False)
+    return found  # type: ignore[no-any-return]
 
 
 def _anywhere(state: State, category: str) -> bool:

@@ -6,6 +6,7 @@ brought about is missed.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 Names = dict[str, str]
+_RECENT = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +48,22 @@ class Possible(Grounder):
             for n in names
         }
         self._can: dict[tuple[str, ...], bool] = {}
+        self._bindings: dict[tuple[int, tuple[str, ...]], tuple[Names, ...]] = {}
         self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
 
     def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
         """A relation that holds or could be brought about."""
         atom = (predicate, *args)
+        if predicate in self.rigid:
+            return atom in self.state.facts
+        if atom in self.state.facts:
+            return self.number_of(atom)
         found = self._can.get(atom)
         if found is None:
             self._can[atom] = False
-            found = atom in self.state.facts or any(
+            found = self._can[atom] = any(
                 True for way in self.ways.get(predicate, ()) for _ in self.bindings(way, atom)
             )
-            self._can[atom] = found
         return self.number_of(atom) if found else False
 
     def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
@@ -66,7 +72,7 @@ class Possible(Grounder):
         found = self._options.get(key)
         if found is None:
             self._options[key] = ()
-            names = dict.fromkeys(self.state.related(predicate, position, args))
+            names: dict[str, None] = {}
             atom = (predicate, *(a if i != position else "?" for i, a in enumerate(args)))
             for way in self.ways.get(predicate, ()):
                 assert isinstance(way.what, Literal)
@@ -76,7 +82,15 @@ class Possible(Grounder):
                     if name is not None:
                         names[name] = None
             found = self._options[key] = tuple(names)
-        return found
+        now = [x for x in self.state.related(predicate, position, args) if x not in found]
+        return (*now, *found)
+
+    def known_bindings(self, way: Way, atom: tuple[str, ...]) -> Sequence[Names]:
+        """The bindings of `bindings`, worked out once."""
+        key = (id(way), atom)
+        if key not in self._bindings:
+            self._bindings[key] = tuple(self.bindings(way, atom))
+        return self._bindings[key]
 
     def bindings(self, way: Way, atom: tuple[str, ...]) -> Iterator[Names]:
         """Bindings of a schema's parameters by which a way leads to a fact."""
@@ -153,6 +167,23 @@ class Possible(Grounder):
                         yield known
                 elif self.schemas.formula(condition)(self, known) is not False:
                     yield known
+
+
+def possible(state: State, made: Made) -> Possible:
+    """What could be brought about among the things of a state, worked out once for these things.
+
+    That a relation holds at first is asked anew; what follows from it may be remembered, by which
+    too much is thought possible, never too little of what skills do.
+    """
+    recent = state.domain.__dict__.setdefault("_possible", OrderedDict())
+    key = (tuple(state.kinds.items()), state.lost, tuple(made.items()))
+    found: Possible | None = recent.get(key)
+    if found is None:
+        found = recent[key] = Possible(state, made)
+        if len(recent) > _RECENT:
+            recent.popitem(last=False)
+    found.state = state
+    return found
 
 
 def ways_of(domain: Domain) -> dict[str, list[Way]]:

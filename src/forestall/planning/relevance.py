@@ -23,7 +23,7 @@ from forestall.domain.formula import (
 from forestall.domain.model import Copy, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, makeable
 from forestall.planning.grounder import Universe
-from forestall.planning.possible import Names, Possible, Way
+from forestall.planning.possible import Names, Way, possible
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
@@ -91,14 +91,13 @@ class _Closure:
     def __init__(self, state: State) -> None:
         self.state, self.domain = state, state.domain
         self.all_made = makeable(state)
-        self.world = Possible(state, self.all_made)
+        self.world = possible(state, self.all_made)
         self.schemas = self.world.schemas
         self.kept: set[str] = set()
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self.purposeful: set[str] = set()
         self.cleared: set[str] = set()
         self.visited: set[tuple[object, ...]] = set()
-        self._eases: dict[str, tuple[object, ...]] = {}
 
     def keep(self, names: Iterable[str]) -> None:
         """Keep things, with what has them, what blocks them, and what fills a limited place."""
@@ -243,9 +242,7 @@ class _Closure:
         return best[:most]
 
     def _ease(self, name: str) -> tuple[object, ...]:
-        rest = self._eases.get(name)
-        if rest is None:
-            rest = self._eases[name] = self._judged(name)
+        rest = self.state.follow(("ease", name), lambda: self._judged(name))
         return (rest[0], name not in self.kept, *rest[1:])
 
     def _judged(self, name: str) -> tuple[object, ...]:
@@ -278,6 +275,8 @@ class _Closure:
         if literal.value == "false":
             self._end(literal, depth)
             return
+        if known.contains:
+            self.use(literal.args[0])
         atom = (literal.predicate, *literal.args)
         for way in self.world.ways.get(literal.predicate, ()):
             if isinstance(way.what, Copy) or way.what.value == literal.value:
@@ -292,7 +291,7 @@ class _Closure:
         else:
             conditions += [n.formula for n in way.schema.needs]
             new |= {c.variable.name for c in way.schema.choices}
-        found = list(self.world.bindings(way, atom))
+        found = list(self.world.known_bindings(way, atom))
         if isinstance(way.what, Copy):
             copy = way.what
             if _denied(conditions, copy, literal.value):

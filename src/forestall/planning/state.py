@@ -6,9 +6,10 @@ replanner. It answers every formula of the domain with yes or no.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import TypeVar
 
 from forestall.domain.evaluate import TRUE, by_number, literal_truth, number_of
 from forestall.domain.formula import Formula, Parameter
@@ -23,6 +24,7 @@ CROWDED = 0.6
 """Share of a support's footprint from which on another one is preferred."""
 
 Fact = tuple[str, ...]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +53,8 @@ class State:
     """
 
     __slots__ = (
-        "_asked", "_index", "_kind_index", "assumed", "at", "changed", "crowded", "domain", "facts",
-        "hidden", "kinds", "lost", "values",
+        "_asked", "_done", "_index", "_kind_index", "assumed", "at", "changed", "crowded", "domain",
+        "facts", "hidden", "kinds", "lost", "values",
     )  # fmt: skip
 
     def __init__(
@@ -73,6 +75,7 @@ class State:
         self._index: dict[tuple[str, int, str], frozenset[Fact]] = {}
         self.changed: set[str] = set(domain.predicates)
         self._asked: Asked | None = None
+        self._done: dict[object, object] = {}
         self._kind_index: dict[str, tuple[str, ...]] = {}
         for fact in facts:
             self.add(fact)
@@ -125,7 +128,7 @@ class State:
         other.domain, other.kinds, other.values = self.domain, dict(self.kinds), dict(self.values)
         other.facts = set(self.facts)
         other._index = dict(self._index)
-        other.changed, other._asked = set(self.changed), None
+        other.changed, other._asked, other._done = set(self.changed), None, {}
         other._kind_index = self._kind_index
         other.at, other.lost, other.hidden = self.at, self.lost, self.hidden
         other.crowded, other.assumed = self.crowded, self.assumed
@@ -144,6 +147,7 @@ class State:
                     for old in tuple(self._index.get((name, 0, fact[1]), ())):
                         self.remove(old)
         self.facts.add(fact)
+        self._done.clear()
         self.changed.add(fact[0])
         for position, arg in enumerate(fact[1:]):
             key = (fact[0], position, arg)
@@ -154,6 +158,7 @@ class State:
         if fact not in self.facts:
             return
         self.facts.discard(fact)
+        self._done.clear()
         self.changed.add(fact[0])
         for position, arg in enumerate(fact[1:]):
             key = (fact[0], position, arg)
@@ -170,6 +175,7 @@ class State:
             return
         if old != value:
             self.values[name, attribute] = value
+            self._done.clear()
             self.changed.add(attribute)
         if self.assumed:
             self.assumed -= {Literal(attribute, (name,), old)}
@@ -177,6 +183,7 @@ class State:
     def create(self, name: str, category: str) -> None:
         """A new thing with the defaults of its category."""
         self.kinds[name] = category
+        self._done.clear()
         self._kind_index = {}
         for attribute, value in self.domain.default_states(category).items():
             self.values[name, attribute] = value
@@ -185,6 +192,7 @@ class State:
     def take_away(self, name: str) -> None:
         """A thing is no more; histories of it stay."""
         del self.kinds[name]
+        self._done.clear()
         self._kind_index = {}
         for key in [k for k in self.values if k[0] == name]:
             del self.values[key]
@@ -238,7 +246,8 @@ class State:
         if not found:
             return []
         if len(args) == 2:
-            return sorted([f[position + 1] for f in found])
+            several = [f[position + 1] for f in found]
+            return several if len(several) == 1 else sorted(several)
         return sorted(
             {
                 f[position + 1]
@@ -283,6 +292,16 @@ class State:
         asked = self.asked
         join = asked.schemas.join(variables, formula, frozenset(names))
         return (b for b, node in join(asked, names) if node is True)
+
+    def follow(self, step: Hashable, act: Callable[[], T]) -> T:
+        """What an action on this state gives, worked out once.
+
+        A change of the state forgets it.
+        """
+        key = (step, self.at)
+        if key not in self._done:
+            self._done[key] = act()
+        return self._done[key]  # type: ignore[return-value]
 
     @property
     def asked(self) -> Asked:
