@@ -22,7 +22,7 @@ PLUGINS = ("domains", "worlds", "testing", "training", "cli")
 
 PLAIN = {
     "open", "on", "off", "closed", "empty", "room", "inside", "whole", "near", "raw", "place",
-    "clean", "above", "below", "behind", "insert", "broken", "in_front_of",
+    "clean", "within", "above", "below", "behind", "insert", "broken", "in_front_of",
 }  # fmt: skip
 """Words of English, of JSON keys and of file modes that a domain happens to use, too."""
 

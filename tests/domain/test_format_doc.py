@@ -10,8 +10,8 @@ from pddl_corpus import FOLDER, execute, subtask
 from forestall.domain.json_schema import domain_schema
 from forestall.domain.load import read_domain
 from forestall.domain.pddl_in import SUPPORTED, read_pddl
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
 
 TEXT = (Path(__file__).parents[2] / "docs" / "domain-format.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)

@@ -13,9 +13,9 @@ from forestall.domain.formula import TRUE
 from forestall.domain.load import shipped
 from forestall.domain.pddl_in import read_pddl
 from forestall.domain.pddl_out import domain_pddl, problem_pddl
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.pddl_problem import read_problem
-from forestall.planning_new.state import State
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.pddl_problem import read_problem
+from forestall.planning.state import State
 
 MAKERS = ("slice_obj", "crack_obj")
 HOUSEHOLD = replace(

@@ -9,7 +9,7 @@ from itertools import product
 import pytest
 from pddl_corpus import FOLDER, NAMES, problem, subtask
 
-from forestall.planning_new.execute import Refusal, apply
+from forestall.planning.execute import Refusal, apply
 from forestall.types.plan import Subtask
 
 pytestmark = [

@@ -8,8 +8,8 @@ from pddl_corpus import FOLDER, NAMES, execute, plan, problem, subtask
 from forestall.domain.load import load_domain
 from forestall.domain.pddl_in import read_pddl
 from forestall.errors import DomainError
-from forestall.planning_new.execute import Refusal, apply
-from forestall.planning_new.pddl_problem import read_problem
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.pddl_problem import read_problem
 
 
 @pytest.mark.parametrize("name", NAMES)

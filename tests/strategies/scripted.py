@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from forestall.domain.load import shipped
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation
@@ -60,6 +61,7 @@ class Parts:
         self.judged: list[tuple[Reference, ...]] = []
         self.asked: list[BoundaryContext] = []
         self.plans: list[Plan] = []
+        self.domain = shipped("household")
 
     def retrieve(self, subtask, task, done):  # type: ignore[no-untyped-def]
         return REFERENCES
