@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from math import inf
 
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Not, free
 from forestall.domain.model import Domain, Effect, PredicateKind, Skill
 from forestall.planning.choices import Choices
+from forestall.planning.drafts import Change, Draft, Event, Grounding
 from forestall.planning.execute import mentions
 from forestall.planning.grounder import EXISTS, Grounder, Universe
 from forestall.planning.needs import adds_relation, asks_relation, simple_needs
@@ -25,44 +25,6 @@ from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 
 Names = dict[str, str]
-
-
-@dataclass(slots=True)
-class Change:
-    """A conditional effect by numbers of facts."""
-
-    condition: Node
-    add: list[int]
-    delete: list[int]
-
-
-@dataclass(slots=True)
-class Draft:
-    """A ground skill before its facts become bits."""
-
-    subtask: Subtask
-    condition: Node
-    changes: list[Change]
-    prefers: list[Node] = field(default_factory=list)
-    over: str | None = None
-    makes: tuple[str, ...] = ()
-
-
-@dataclass(slots=True)
-class Event:
-    """A ground process before its facts become bits."""
-
-    condition: Node
-    changes: list[Change]
-
-
-@dataclass(slots=True)
-class Grounding:
-    """Everything that can happen in a universe."""
-
-    grounder: Grounder
-    drafts: list[Draft]
-    processes: list[list[Event]]
 
 
 class _SkillPlan:
