@@ -153,3 +153,14 @@ def test_never_counts_what_happened_in_between() -> None:
     check = CHECK(plan("toggle_on(Faucet)\ntoggle_off(Faucet)"), graph, wanted)
     assert not check.ok
     assert check.unmet == (Literal("filled", ("Mug-1",), "water"),)
+
+
+def test_a_plan_is_checked_with_instances_and_unknown_steps_are_named() -> None:
+    graph = scene(
+        home_of("make-coffee"), "Mug-2 on CounterTop-2, Mug-1 on CounterTop-1, Pot-1 blocks Mug-1"
+    )
+    check = CHECK(plan("pick_up(Mug)\nput_on(Mug, CounterTop)"), graph, goal("hand_empty()"))
+    assert check.ok and check.plan is not None
+    assert check.plan.texts() == ["pick_up(Mug-2)", "put_on(Mug-2, CounterTop-1)"]
+    wrong = CHECK(plan("pick_up(Mug)\npick_up(Spaceship)"), graph, goal("hand_empty()"))
+    assert (wrong.ok, wrong.step) == (False, 1)

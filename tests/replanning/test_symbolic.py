@@ -370,3 +370,22 @@ def test_the_thing_at_hand_is_named_where_there_are_several() -> None:
     assert answer.plan is not None
     assert "put_in(Mug-2, CoffeeMachine-1)" in answer.plan.texts()
     assert not any("Mug-1" in t for t in answer.plan.texts())
+
+
+def test_two_mugs_the_near_one_blocked_and_the_plan_names_the_one_it_was_checked_with() -> None:
+    graph = scene(
+        home_of("make-coffee"),
+        "Mug-2 on CounterTop-2, Mug-1 on CounterTop-1, Pot-1 blocks Mug-1",
+        "Cup-1 in CoffeeMachine-1",
+    )
+    current = PLANS["make-coffee"]
+    answer = PlannerReplanner(VALIDATOR, DOMAIN).replan(
+        context("make-coffee", current, current.texts().index("pick_up(Mug)"), graph),
+        Diagnosis("a cup is in the way", (Literal.parse("vacant(CoffeeMachine-1)"),)),
+    )
+    assert answer.plan is not None and answer.check is not None and answer.check.plan is not None
+    sent = [s for s in answer.plan if s.skill == "pick_up" and "Mug" in s.args[0]]
+    assert sent and all(s.args == ("Mug-2",) for s in sent)
+    assert [
+        s.args[0] for s in answer.check.plan if s.skill == "pick_up" and "Mug" in s.args[0]
+    ] == [s.args[0] for s in sent]

@@ -8,59 +8,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from math import inf
 
 from forestall.domain.evaluate import by_number
-from forestall.domain.formula import And, Formula, Not, Some, free, literals, normal
-from forestall.domain.model import FACING, Choice, Domain, Effect, PredicateKind, Skill
+from forestall.domain.formula import Not, free
+from forestall.domain.model import Domain, Effect, PredicateKind, Skill
+from forestall.planning.choices import Choices
+from forestall.planning.drafts import Change, Draft, Event, Grounding
 from forestall.planning.execute import mentions
 from forestall.planning.grounder import EXISTS, Grounder, Universe
-from forestall.planning.nodes import Junction, Node, all_of, any_of, negate
+from forestall.planning.needs import adds_relation, asks_relation, simple_needs
+from forestall.planning.nodes import Junction, Node, all_of, negate
 from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 
 Names = dict[str, str]
-
-
-@dataclass(slots=True)
-class Change:
-    """A conditional effect by numbers of facts."""
-
-    condition: Node
-    add: list[int]
-    delete: list[int]
-
-
-@dataclass(slots=True)
-class Draft:
-    """A ground skill before its facts become bits."""
-
-    subtask: Subtask
-    condition: Node
-    changes: list[Change]
-    prefers: list[Node] = field(default_factory=list)
-    over: str | None = None
-    makes: tuple[str, ...] = ()
-
-
-@dataclass(slots=True)
-class Event:
-    """A ground process before its facts become bits."""
-
-    condition: Node
-    changes: list[Change]
-
-
-@dataclass(slots=True)
-class Grounding:
-    """Everything that can happen in a universe."""
-
-    grounder: Grounder
-    drafts: list[Draft]
-    processes: list[list[Event]]
 
 
 class _SkillPlan:
@@ -71,10 +35,10 @@ class _SkillPlan:
         families = [s.family or s.name for s in domain.skills.values()]
         self.rank = families.index(skill.family or skill.name)
         self.simple = simple_needs(domain, skill)
-        self.relational = [e for e in skill.effects if _adds_relation(domain, e)]
-        self.stable = not any(
-            _asks_relation(domain, e.condition) for e in self.relational
-        ) and not (skill.choices or skill.makes)
+        self.relational = [e for e in skill.effects if adds_relation(domain, e)]
+        self.stable = not any(asks_relation(domain, e.condition) for e in self.relational) and not (
+            skill.choices or skill.makes
+        )
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
 
 
@@ -98,6 +62,7 @@ class _Grounding:
         self.schemas = schemas_of(state.domain)
         self.grounder = Grounder(state, universe, self.schemas)
         self.universe, self.state = universe, state
+        self.choices = Choices(self.grounder)
         plans = self.domain.__dict__.get("_skill_plans")
         if plans is None:
             able = self.domain.robot.skills or tuple(self.domain.skills)
@@ -146,10 +111,12 @@ class _Grounding:
                     if plan.stable and key in self._seen:
                         continue
                     self._seen.add(key)
-                    for bound in self._choices(plan.skill, names):
-                        news |= self._bring(plan.relational, bound, self._made(plan.skill, names))
+                    made = self._made(plan.skill, names)
+                    first = {v: pieces[0] for v, pieces in made.items()}
+                    for bound in self.choices.bindings(plan.skill, names, first):
+                        news |= self._bring(plan.relational, bound, made)
             for process in self.domain.processes:
-                relational = [e for e in process.effects if _adds_relation(self.domain, e)]
+                relational = [e for e in process.effects if adds_relation(self.domain, e)]
                 if relational:
                     join = self.schemas.join(process.parameters, process.condition, frozenset())
                     for found, _ in join(self.grounder, {}):
@@ -231,94 +198,6 @@ class _Grounding:
         away = any(x in self.universe.supports for x in list(names.values())[-1:])
         return plan.rank, several[:-1], not away, several
 
-    # --- choices ---------------------------------------------------------------------------------
-
-    def _choices(self, skill: Skill, names: Names) -> list[Names]:
-        """Bindings with every thing that may be chosen."""
-        first = {v: pieces[0] for v, pieces in self._made(skill, names).items()}
-        several = [names]
-        for choice in skill.choices:
-            several = [
-                {**b, **chosen}
-                for b in several
-                for chosen, _, _ in self._chosen(choice, {**b, **first})
-            ]
-        return several
-
-    def _chosen(self, choice: Choice, known: Names) -> list[tuple[Names, Node, str | None]]:
-        """What may be chosen, with the condition, and what must be faced for it."""
-        g, variable = self.grounder, choice.variable.name
-        only = self.schemas.formula(choice.only_if)(g, known)
-        found: list[tuple[Names, Node, str | None]] = []
-        if only is not False and _asks(choice.among, FACING):
-            found = self._faced(choice, known, only)
-        elif only is not False:
-            before: list[Node] = []
-            for formula in choice.among:
-                fitting = self._fitting(choice, formula, known)
-                for i, (name, node) in enumerate(fitting):
-                    lower = [negate(n) for _, n in fitting[:i]]
-                    needed = all_of((only, node, *before, *lower))
-                    if needed is not False:
-                        found.append(({variable: name}, needed, None))
-                before += [negate(n) for _, n in fitting]
-                if any(n is True for _, n in fitting):
-                    break
-        none = negate(only)
-        if not choice.sentence and not found:
-            none = True
-        if none is not False:
-            found.append(({}, none, None))
-        return found
-
-    def _faced(
-        self, choice: Choice, known: Names, only: Node
-    ) -> list[tuple[Names, Node, str | None]]:
-        """Things that are chosen once the robot faces them."""
-        g, variable = self.grounder, choice.variable.name
-        such = self.schemas.join(
-            (choice.variable,), choice.such_that, self.schemas.free(choice.such_that)
-        )
-        found: list[tuple[Names, Node, str | None]] = []
-        for bound, node in such(g, known):
-            name = bound[variable]
-            if not self._may_receive(known, name):
-                continue
-
-            def ask(bound: Names = bound, name: str = name) -> Node:
-                earlier: list[Node] = []
-                ways: list[Node] = []
-                for formula in choice.among:
-                    here = self.schemas.formula(formula)(g, bound)
-                    ways.append(all_of((here, *earlier)))
-                    if here is True:
-                        break
-                    fitting = self._fitting(choice, formula, known)
-                    earlier += [negate(n) for x, n in fitting if x != name]
-                return any_of(ways)
-
-            needed = all_of((only, node, g.chosen(name, ask)))
-            if needed is not False:
-                found.append(({variable: name}, needed, name))
-        return found
-
-    def _may_receive(self, known: Names, place: str) -> bool:
-        made = {n for names in self.universe.made.values() for n in names}
-        things = [n for n in known.values() if n in made] or list(known.values())
-        return all(self.universe.allows(self.domain, x, place) for x in things)
-
-    def _fitting(self, choice: Choice, formula: Formula, known: Names) -> list[tuple[str, Node]]:
-        """Things that a formula and `such_that` are true of, lowest number first."""
-        g, variable = self.grounder, choice.variable.name
-        join = self.schemas.join((choice.variable,), formula, self.schemas.free(formula))
-        such = self.schemas.formula(choice.such_that)
-        nodes: dict[str, Node] = {}
-        for bound, node in join(g, known):
-            both = all_of((node, such(g, bound)))
-            if both is not False:
-                nodes[bound[variable]] = any_of((nodes.get(bound[variable], False), both))
-        return sorted(nodes.items(), key=lambda pair: by_number(pair[0]))
-
     # --- drafts ----------------------------------------------------------------------------------
 
     def _drafts(self, plan: _SkillPlan, names: Names) -> Iterator[Draft]:
@@ -331,7 +210,7 @@ class _Grounding:
             variants = [
                 ({**b, **chosen}, [*nodes, node], over or faced)
                 for b, nodes, over in variants
-                for chosen, node, faced in self._chosen(choice, {**b, **first})
+                for chosen, node, faced in self.choices.chosen(choice, {**b, **first})
             ]
         subtask = Subtask(skill.name, tuple(names.values()))
         for bound, nodes, over in variants:
@@ -496,29 +375,6 @@ def _as(skill: Skill, names: Names) -> Names:
     return {p.name: a for p, a in zip(skill.parameters, names.values(), strict=True)}
 
 
-def simple_needs(domain: Domain, skill: Skill) -> Formula:
-    """What tells at once whether a skill can ever run: the positive and the unchanging needs."""
-    parts = [p for n in skill.needs for p in _conjuncts(normal(n.formula))]
-    own = {p.name for p in skill.parameters}
-    return And(tuple(p for p in parts if free(p) <= own and _simple(domain, p)))
-
-
-def plain_parts(domain: Domain, formula: Formula) -> And:
-    """The parts of a conjunction that never change; the same object for the same formula."""
-    found = domain.__dict__.setdefault("_plain_parts", {}).get(id(formula))
-    if found is None or found[0] is not formula:
-        parts = tuple(p for p in _conjuncts(normal(formula)) if _unchanging(domain, p))
-        found = domain.__dict__["_plain_parts"][id(formula)] = (formula, And(parts))
-    return found[1]  # type: ignore[no-any-return]
-
-
-def _unchanging(domain: Domain, formula: Formula) -> bool:
-    if not isinstance(formula, Literal) or formula.predicate == FACING:
-        return False
-    known = domain.predicates.get(formula.predicate)
-    return known is None or known.kind is PredicateKind.STATIC
-
-
 def _atom(fact: Literal, names: Names) -> tuple[str, ...] | None:
     args = tuple([names.get(a, a) for a in fact.args])
     return None if any(a.startswith("?") for a in args) else (fact.predicate, *args)
@@ -532,43 +388,7 @@ def _unbound(effect: Effect, known: set[str]) -> bool:
     return not used <= known
 
 
-def _conjuncts(formula: Formula) -> tuple[Formula, ...]:
-    if isinstance(formula, And):
-        return tuple(c for p in formula.parts for c in _conjuncts(p))
-    return (formula,)
-
-
 def _parts(node: Node) -> tuple[Node, ...]:
     if isinstance(node, Junction) and node.kind == "and":
         return node.parts
     return () if node is True else (node,)
-
-
-def _simple(domain: Domain, formula: Formula) -> bool:
-    """Whether a need tells at once whether a skill can ever run."""
-    if isinstance(formula, Literal):
-        known = domain.predicates.get(formula.predicate)
-        if known is None:
-            return formula.predicate != FACING
-        if known.kind in (PredicateKind.STATIC, PredicateKind.ATTRIBUTE):
-            return True
-        return known.kind is PredicateKind.RELATION and formula.value != "false"
-    if isinstance(formula, Some | Not):
-        return False
-    parts = getattr(formula, "parts", None)
-    return parts is not None and all(_simple(domain, p) for p in parts)
-
-
-def _adds_relation(domain: Domain, effect: Effect) -> bool:
-    return any(f.predicate in domain.relations and f.value == "true" for f in effect.facts)
-
-
-def _asks_relation(domain: Domain, formula: Formula) -> bool:
-    return any(
-        x.predicate in domain.relations or x.predicate in domain.derived
-        for x, _ in literals(formula)
-    )
-
-
-def _asks(formulas: Iterable[Formula], predicate: str) -> bool:
-    return any(x.predicate == predicate for f in formulas for x, _ in literals(f))

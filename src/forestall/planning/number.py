@@ -12,7 +12,7 @@ from dataclasses import replace
 from forestall.domain.formula import And, Formula
 from forestall.domain.model import PredicateKind
 from forestall.errors import InputError
-from forestall.planning.ground import Change, Draft, Event, Grounding
+from forestall.planning.drafts import Change, Draft, Event, Grounding
 from forestall.planning.nodes import Junction, Node, facts_of
 from forestall.planning.problem import Atom, Effect, Happening, Operator, Problem, Rule, Stratum
 from forestall.planning.state import State, decided

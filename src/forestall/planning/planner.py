@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+from forestall.planning.drafts import Grounding
 from forestall.planning.driving import gathered, with_driving
 from forestall.planning.goals import (
     Alternatives,
@@ -20,7 +21,7 @@ from forestall.planning.goals import (
     negated,
     shown,
 )
-from forestall.planning.ground import Grounding, TooLargeError, ground
+from forestall.planning.ground import TooLargeError, ground
 from forestall.planning.grounder import Universe
 from forestall.planning.number import UnsupportedError, number
 from forestall.planning.problem import Problem

@@ -14,8 +14,8 @@ from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Formula
 from forestall.domain.model import Copy, Domain, Effect, Process, Skill
 from forestall.planning.goals import Made
-from forestall.planning.ground import plain_parts, simple_needs
 from forestall.planning.grounder import Grounder, Universe
+from forestall.planning.needs import plain_parts, simple_needs
 from forestall.planning.nodes import Node
 from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State

@@ -6,8 +6,7 @@ is taken from the relation, the static predicate or the tag that leaves the fewe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from forestall.domain.formula import (
     And,
@@ -23,56 +22,8 @@ from forestall.domain.formula import (
 )
 from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain, PredicateKind
 from forestall.planning.nodes import Node, all_of, any_of, at_least, negate
+from forestall.planning.world import Names, World
 from forestall.types.facts import Literal
-
-Names = Mapping[str, str]
-
-
-class World(Protocol):
-    """What grounding asks about the things at hand (`ground.Grounder`)."""
-
-    def things(self) -> Sequence[str]:
-        """Every thing."""
-
-    def of_kind(self, kind: str) -> Sequence[str]:
-        """Things that count as a kind."""
-
-    def is_a(self, name: str, kind: str) -> bool:
-        """Whether a thing counts as a kind."""
-
-    def same_category(self, one: str, other: str) -> bool:
-        """Whether two things are of one category."""
-
-    def located(self, name: str) -> bool:
-        """Whether the place of a thing is known."""
-
-    def faced(self, name: str) -> Node:
-        """Whether the robot faces a thing."""
-
-    def static(self, predicate: str, args: tuple[str, ...]) -> bool:
-        """Whether a static predicate holds."""
-
-    def static_related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
-        """What fits at a position of a static predicate."""
-
-    def value(self, name: str, attribute: str, value: str) -> Node:
-        """The fact that an attribute has a value."""
-
-    def fact(self, predicate: str, args: tuple[str, ...]) -> Node:
-        """A relation or history."""
-
-    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
-        """What may stand at a position of a relation."""
-
-    def derived(self, predicate: str, args: tuple[str, ...]) -> Node:
-        """A derived fact."""
-
-    def existing(self, name: str, node: Node) -> Node:
-        """A node about a thing, which holds only while that exists."""
-
-    def number(self, name: str, what: str) -> int | None:
-        """A number of a thing."""
-
 
 Ground = Callable[[World, Names], Node]
 Join = Callable[[World, Names], Iterator[tuple[dict[str, str], Node]]]

@@ -7,7 +7,6 @@ replanner. It answers every formula of the domain with yes or no.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from dataclasses import dataclass
 from itertools import product
 from typing import TypeVar
 
@@ -15,24 +14,14 @@ from forestall.domain.evaluate import TRUE, by_number, literal_truth, number_of
 from forestall.domain.formula import Formula, Parameter
 from forestall.domain.model import FACING, LOCATED, Category, Domain, PredicateKind
 from forestall.planning.asked import Asked
+from forestall.planning.places import Place, crowded, places
 from forestall.types.facts import Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
 
 __all__ = ["Place", "State", "by_number", "number_of"]
 
-CROWDED = 0.6
-"""Share of a support's footprint from which on another one is preferred."""
-
 Fact = tuple[str, ...]
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a thing is: a containing relation and the thing that has it."""
-
-    relation: str
-    parent: str
 
 
 class State:
@@ -112,14 +101,14 @@ class State:
                 continue
             if r.predicate in domain.moved and (r.object in state.kinds or r.object in hands):
                 state.add((r.predicate, r.subject, r.object))
-        for name, place in _places(graph, state).items():
+        for name, place in places(graph, state).items():
             state.add((place.relation, name, place.parent))
         state.lost = frozenset(lost)
         state.hidden = frozenset(h for h in graph.hidden if h in state.kinds)
         if roles.vacant is not None:
             assumed |= {Literal(roles.vacant, (h,)) for h in state.hidden}
         state.assumed = frozenset(assumed)
-        state.crowded = _crowded(graph, domain)
+        state.crowded = crowded(graph, domain)
         return state
 
     def copy(self) -> State:
@@ -398,49 +387,3 @@ def decided(domain: Domain, literal: Literal) -> bool:
     if known is None:
         return literal.predicate == LOCATED or domain.known_kind(literal.predicate)
     return known.kind is not PredicateKind.RELATION or literal.predicate in domain.moved
-
-
-def _crowded(graph: SceneGraph, domain: Domain) -> frozenset[str]:
-    """Supports whose contents cover more than `CROWDED` of their own footprint."""
-    covered: dict[str, float] = {}
-    area_m2 = {n.id: n.box_m.size[0] * n.box_m.size[1] for n in graph.nodes if n.box_m is not None}
-    for r in graph.relations:
-        if r.predicate in domain.containing and domain.is_a(r.object, domain.roles.support):
-            covered[r.object] = covered.get(r.object, 0.0) + area_m2.get(r.subject, 0.0)
-    return frozenset(x for x, a in covered.items() if x in area_m2 and a > CROWDED * area_m2[x])
-
-
-def _places(graph: SceneGraph, state: State) -> dict[str, Place]:
-    """One place for each thing: the innermost of several, the ground last, no cycles."""
-    domain = state.domain
-    held = {h for _, h in state.in_hands()}
-    order = {relation: i for i, relation in enumerate(domain.containing)}
-    edges: dict[str, list[Place]] = {}
-    for r in graph.relations:
-        known = r.subject in state.kinds and r.object in state.kinds and r.subject not in held
-        if known and r.predicate in order:
-            edges.setdefault(r.subject, []).append(Place(r.predicate, r.object))
-    places: dict[str, Place] = {}
-    for name in sorted(edges, key=by_number):
-        if domain.roles.fixture in state.kind(name).tags:
-            continue
-        parents = {p.parent for p in edges[name]}
-        outer = {q.parent for p in parents for q in edges.get(p, ())}
-        ranked = sorted(
-            edges[name],
-            key=lambda p: (
-                p.parent in outer,
-                domain.is_a(state.kinds[p.parent], domain.roles.ground),
-                order[p.relation],
-                by_number(p.parent),
-            ),
-        )
-        for place in ranked:
-            above, seen = place.parent, {name}
-            while above not in seen and above in places:
-                seen.add(above)
-                above = places[above].parent
-            if above not in seen:
-                places[name] = place
-                break
-    return places
