@@ -98,10 +98,14 @@ def drawn_goal(before: State, after: State, rng: random.Random) -> Goal:
 def wrong(count: int, seed: int) -> list[str]:
     """Goals that can be reached and are not, with what the planner says."""
     rng, found = random.Random(seed), []
-    for _ in range(count):
+    drawn = 0
+    while drawn < count:
         before = kitchen(rng)
         after = reached(before, rng.randint(1, 4), rng)
         wanted = drawn_goal(before, after, rng)
+        if not wanted.literals:
+            continue
+        drawn += 1
         planned = plan_goal(before, wanted)
         if planned.outcome is not ReplanOutcome.SOLVED:
             found.append(

@@ -28,6 +28,7 @@ from forestall.planning.problem import Problem
 from forestall.planning.relevance import everything, narrowed
 from forestall.planning.search import SearchConfig, SearchOutcome, solve
 from forestall.planning.state import State
+from forestall.planning.validate import unmet
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 from forestall.types.task import Goal
@@ -145,13 +146,24 @@ def plan_goal(state: State, goal: Goal, config: SearchConfig | None = None) -> P
         missing += [a for x in goal.literals for a in x.args if _nowhere(state, a)]
         names = ", ".join(dict.fromkeys(missing)) or "what the goal asks for"
         return Planned(ReplanOutcome.UNSOLVABLE, note=f"{names}: its place is not known")
-    planned = plan_to(state, goals, config, widen=False)
+    planned = _met(plan_to(state, goals, config, widen=False), goal)
     if planned.outcome in (ReplanOutcome.NOT_FOUND, ReplanOutcome.REJECTED):
         bounds = config or SearchConfig()
         if planned.expanded < bounds.max_expansions:
             goals = alternatives(state, goal, whole=True)
-            return _on_everything(state, goals, bounds, planned)
+            return _met(_on_everything(state, goals, bounds, planned), goal)
     return planned
+
+
+def _met(planned: Planned, goal: Goal) -> Planned:
+    """A plan that names what it makes otherwise than the goal does is none."""
+    if planned.final is None:
+        return planned
+    missing = unmet((planned.final,), goal)
+    if not missing:
+        return planned
+    note = "the plan that was found does not reach " + ", ".join(map(str, missing))
+    return replace(planned, outcome=ReplanOutcome.REJECTED, subtasks=(), final=None, note=note)
 
 
 def pose(
