@@ -3,26 +3,90 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import fields, replace
 from importlib.resources import files
 from typing import Any
 
 import pytest
 from pddl_corpus import FOLDER, NAMES
 
-from forestall.domain.formula import parse_formula
+from forestall.domain.formula import Parameter, parse_formula
 from forestall.domain.json_schema import domain_schema
-from forestall.domain.load import build_domain, extend, load_domain, read_domain, shipped
+from forestall.domain.load import (
+    ATTRIBUTE_FIELDS,
+    CATEGORY_FIELDS,
+    PREDICATE_FIELDS,
+    build_domain,
+    extend,
+    load_domain,
+    read_domain,
+    shipped,
+    shipped_names,
+)
+from forestall.domain.model import Category, Predicate, PredicateKind, Skill
+from forestall.domain.schemas_in import SKILL_FIELDS
 from forestall.domain.sheet import skill_sheet, skill_words, words_of
 from forestall.domain.toml_out import domain_toml
+from forestall.types.facts import Literal
 
 HOUSEHOLD = files("forestall").joinpath("domains", "household", "domain.toml").read_text()
 
 
-def test_the_household_as_toml_loads_back_equal() -> None:
-    text = domain_toml(shipped("household"))
+@pytest.mark.parametrize("name", shipped_names())
+def test_shipped_domains_as_toml_load_back_equal(name: str) -> None:
+    text = domain_toml(shipped(name))
     again = read_domain(text, "again.toml")
-    assert again == shipped("household")
+    assert again == shipped(name)
     assert domain_toml(again) == text
+    assert errors_of(tomllib.loads(text)) == []
+
+
+OTHER = {
+    "bool": lambda old: not old, "float": lambda old: 2.5, "str": lambda old: "x",
+    "str | None": lambda old: "x", "tuple[str, ...]": lambda old: ("x", "y"),
+    "tuple[float, ...]": lambda old: (0.5, 2.0), "Mapping[str, str]": lambda old: {"off": "x"},
+}  # fmt: skip
+TAGGED = ("fixture", "movable", "support", "ground", "encloses", "crowded", "vacatable", "numbered")
+
+
+def test_no_field_is_forgotten() -> None:
+    """Each field, new ones too, is given another value, written, read and found again."""
+
+    def changed(part: Any, names: tuple[str, ...], **given: Any) -> Any:
+        types = {f.name: f.type for f in fields(part) if f.name not in given}
+        plain = {n: OTHER[types[n]](getattr(part, n)) for n in names if types.get(n) in OTHER}
+        return replace(part, **(plain | given))
+
+    domain = shipped("bench")
+    relation = changed(
+        domain.predicates["seated_in"], PREDICATE_FIELDS,
+        group="place", mirrors="threaded_on", geometry="support", offered_by="hole",
+        paired="same number", contains=True,
+    )  # fmt: skip
+    light = Predicate("light", PredicateKind.ATTRIBUTE, (Parameter("?thing"),), ("off", "on"))
+    light = changed(light, ATTRIBUTE_FIELDS, values=("off", "on"), camera=False, obscures="on")
+    lamp = changed(
+        Category("Lamp"), CATEGORY_FIELDS, attributes=("light",), tags=frozenset({"tool"}),
+        defaults=(("light", "on"),),
+    )  # fmt: skip
+    wave = changed(
+        Skill("wave", (Parameter("?x"),)), SKILL_FIELDS, at="?x", hand="?x",
+        undoes=Literal("light", ("?x",), "on"), done_when=parse_formula("light(?x)=off"),
+        prefers=(parse_formula("light(?x)=off"),),
+    )  # fmt: skip
+    whole = replace(
+        domain,
+        predicates={**domain.predicates, "seated_in": relation, "light": light},
+        categories={**domain.categories, "Lamp": lamp},
+        skills={**domain.skills, "wave": wave},
+        tags=(*domain.tags, "x", *TAGGED),
+        constants=(("lamp", "Lamp"),),
+        spelling=(("lamp", "LAMP"),),
+        run=(("world", "x"),),
+    )
+    text = domain_toml(whole)
+    assert errors_of(tomllib.loads(text)) == []
+    assert read_domain(text, "again.toml") == whole
 
 
 def test_statics_that_were_given_from_the_other_side_stay() -> None:
@@ -117,7 +181,9 @@ def errors_of(data: Any) -> list[str]:
 def test_domain_files_fit_the_schema() -> None:
     jsonschema = pytest.importorskip("jsonschema")
     jsonschema.Draft202012Validator.check_schema(domain_schema())
-    assert errors_of(tomllib.loads(HOUSEHOLD)) == []
+    for name in shipped_names():
+        file = files("forestall").joinpath("domains", name, "domain.toml")
+        assert errors_of(tomllib.loads(file.read_text(encoding="utf-8"))) == []
     for name in NAMES:
         text = domain_toml(load_domain(str(FOLDER / f"{name}.pddl")))
         assert errors_of(tomllib.loads(text)) == []

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import pytest
 
-from forestall.domain.load import domain_of
 from forestall.planning.planner import Planned, plan_goal
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import observed
@@ -63,7 +62,7 @@ class Run:
         )
 
     def planned(self) -> Planned:
-        truth = observed(self.kitchen.oracle.truth(), domain_of(self.loaded.vocabulary))
+        truth = observed(self.kitchen.oracle.truth(), self.loaded.domain)
         return plan_goal(truth, self.loaded.task.goal, QUICK)
 
 

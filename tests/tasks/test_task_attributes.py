@@ -12,7 +12,6 @@ from forestall.assembly.configuration import run_config
 from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import ScoreConfig
 from forestall.comparison.preconditions import mine
-from forestall.domain.load import domain_of
 from forestall.embeddings.hashed import HashedTextEncoder
 from forestall.memory.recording import demonstration_from
 from forestall.perception.given import GivenStateEstimator
@@ -158,12 +157,10 @@ def test_planning_takes_it_as_a_fact_that_no_skill_changes(loaded: LoadedTask) -
         tomato = ObjectNode("Tomato-1", "Tomato", (("ripe", value),))
         on_counter = [Relation(n, "on_top_of", "CounterTop-1") for n in ("Tomato-1", "Knife-1")]
         graph = SceneGraph((*fixtures, knife, tomato), tuple(on_counter))
-        check = GraphValidator(domain_of(loaded.vocabulary)).check(
-            loaded.task.plan, graph, loaded.task.goal
-        )
+        check = GraphValidator(loaded.domain).check(loaded.task.plan, graph, loaded.task.goal)
         assert check.ok is ok
         assert [str(x) for x in check.unmet] == ([] if ok else ["ripe(Tomato-1)=ripe"])
-        state: object = State.from_graph(graph, domain_of(loaded.vocabulary))
+        state: object = State.from_graph(graph, loaded.domain)
         for step in ("pick_up(Knife)", "slice_obj(Tomato)"):
             assert isinstance(state, State)
             state = apply(state, Subtask.parse(step))
@@ -213,7 +210,5 @@ def test_a_memory_that_knows_more_attributes_does_no_harm(loaded: LoadedTask) ->
     mined = mine(references, plain, subtask=PICK_UP, task="fetch-tomato")
     assert "sliced(?object)=whole" in {str(p.literal) for p in mined}
     assert "ripe" not in {p.literal.predicate for p in mined}
-    check = GraphValidator(domain_of(plain)).check(
-        Plan((PICK_UP,)), graph, Goal("any", literals=())
-    )
+    check = GraphValidator(plain).check(Plan((PICK_UP,)), graph, Goal("any", literals=()))
     assert check.ok

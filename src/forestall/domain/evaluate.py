@@ -150,13 +150,17 @@ def _defined_truth(known: Predicate, args: tuple[str, ...], view: View) -> int:
     return evaluate(_normal(known.definition), view, binding)
 
 
-class _Circle:
-    """What is known so far of predicates that are defined with each other, in one view."""
+class Circle:
+    """What is known so far of predicates that are defined with each other.
 
-    __slots__ = ("best", "closed", "members", "now", "view")
+    Args:
+        work_out: the truth of a derived fact by its definition; it asks this circle for the others.
+    """
 
-    def __init__(self, view: View, members: frozenset[str]) -> None:
-        self.view, self.members = view, members
+    __slots__ = ("best", "closed", "now", "work_out")
+
+    def __init__(self, work_out: Callable[[Predicate, tuple[str, ...]], int]) -> None:
+        self.work_out = work_out
         self.best: dict[tuple[str, ...], int] = {}
         self.now: dict[tuple[str, ...], int | None] = {}
         self.closed = False
@@ -171,8 +175,15 @@ class _Circle:
             self.closed = True
             return self.best.get(key, FALSE)
         self.now[key] = None
-        truth = self.now[key] = _defined_truth(known, args, self.view)
+        truth = self.now[key] = self.work_out(known, args)
         return truth
+
+    def settle(self, known: Predicate, args: tuple[str, ...]) -> int:
+        """The least fixpoint, so that facts that go in a circle support nothing."""
+        while True:
+            truth = self.ask(known, args)
+            if not self.closed or not self.rises():
+                return truth
 
     def rises(self) -> bool:
         """Whether going round once more can make more of it true."""
@@ -188,16 +199,13 @@ _open = threading.local()
 def _recursive_truth(
     known: Predicate, args: tuple[str, ...], view: View, members: frozenset[str]
 ) -> int:
-    """The least fixpoint, so that facts that go in a circle support nothing."""
-    outer: _Circle | None = getattr(_open, "circle", None)
-    if outer is not None and outer.view is view and outer.members is members:
-        return outer.ask(known, args)
-    circle = _open.circle = _Circle(view, members)
+    outer: tuple[View, frozenset[str], Circle] | None = getattr(_open, "circle", None)
+    if outer is not None and outer[0] is view and outer[1] is members:
+        return outer[2].ask(known, args)
+    circle = Circle(lambda inner, those: _defined_truth(inner, those, view))
+    _open.circle = view, members, circle
     try:
-        while True:
-            truth = circle.ask(known, args)
-            if not circle.closed or not circle.rises():
-                return truth
+        return circle.settle(known, args)
     finally:
         _open.circle = outer
 

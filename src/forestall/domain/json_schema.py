@@ -1,15 +1,18 @@
 """The JSON schema of a domain file, for editors and for whoever writes files with a program.
 
-Called by the command line; calls `model` for what the closed sets are. It says which fields there
-are and of which form; whether the names in them mean something is what `load` checks.
+Called by the command line; calls `load` for the fields. It says which fields there are and of
+which form; whether the names in them mean something is what `load` checks.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
-from forestall.domain.model import PredicateKind, Roles
+from forestall.domain.load import ATTRIBUTE_FIELDS, CATEGORY_FIELDS, PREDICATE_FIELDS
+from forestall.domain.model import Category, Predicate, PredicateKind, Roles, Skill
+from forestall.domain.schemas_in import SKILL_FIELDS
 
 Schema = dict[str, Any]
 
@@ -18,6 +21,16 @@ _TEXTS: Schema = {"type": "array", "items": {"type": "string"}}
 _FLAG: Schema = {"type": "boolean"}
 _NUMBER: Schema = {"type": "number"}
 _NAMES: Schema = {"type": "object", "additionalProperties": {"type": "string"}}
+_BY_TYPE: dict[str, Schema] = {
+    "str": {"type": "string"},
+    "str | None": _TEXT,
+    "bool": _FLAG,
+    "float": _NUMBER,
+    "tuple[str, ...]": _TEXTS,
+    "tuple[float, ...]": {"type": "array", "items": _NUMBER},
+    "Names": _NAMES,
+    "Mapping[str, str]": _NAMES,
+}
 
 
 def domain_schema() -> Schema:
@@ -31,6 +44,10 @@ def domain_schema() -> Schema:
                 "tags": {**_TEXTS, "description": "every tag that a category may have"},
                 "roles": _roles(),
                 "robot": _object({"hands": _TEXTS, "skills": _TEXTS}),
+                "run": {
+                    **_NAMES,
+                    "description": "kind of part -> the part of a run that says nothing else",
+                },
                 "constants": {**_NAMES, "description": "thing that every scene has -> category"},
                 "spelling": {**_NAMES, "description": "name -> how a PDDL file spells it"},
                 "predicates": _tables(_predicate(), r"^[a-z_][a-z0-9_]*$"),
@@ -120,66 +137,52 @@ def _definitions() -> Schema:
     }
 
 
+def _of(kind: type, names: Iterable[str], special: Schema, *required: str) -> Schema:
+    """The schema of a table that is a dataclass: each field by its type, or as given."""
+    types = {f.name: _BY_TYPE.get(str(f.type)) for f in fields(kind)}
+    properties = {n: special[n] if n in special else types[n] for n in names}
+    missing = [n for n, schema in properties.items() if schema is None]
+    assert not missing, f"no schema for {kind.__name__}: {', '.join(missing)}"
+    return _object(properties, *required)
+
+
 def _roles() -> Schema:
-    lists = {f.name for f in fields(Roles) if isinstance(f.default, tuple)}
-    return _object({f.name: _TEXTS if f.name in lists else _TEXT for f in fields(Roles)})
+    return _of(Roles, [f.name for f in fields(Roles)], {})
 
 
 def _predicate() -> Schema:
     kinds = [k.value for k in PredicateKind if k is not PredicateKind.ATTRIBUTE]
-    schema = _object(
-        {
-            "kind": {"enum": kinds},
-            "parameters": _ref("parameters"),
-            "definition": _ref("formula"),
-            "camera": _FLAG,
-            "contains": _FLAG,
-            "group": _TEXT,
-            "scored": _FLAG,
-            "lasting": _FLAG,
-            "paired": {"enum": ["", "same number", "same number or first"]},
-            "mined": _FLAG,
-            "words": {"type": "string"},
-            "opposite": {"type": "string"},
-            "bins": {"type": "array", "items": _NUMBER},
-            "unit": {"type": "string"},
-        },
-        "kind",
-    )
+    special = {
+        "kind": {"enum": kinds},
+        "parameters": _ref("parameters"),
+        "definition": _ref("formula"),
+        "geometry": {"enum": ["", "containment", "support"]},
+        "paired": {"enum": ["", "same number", "same number or first"]},
+    }
+    schema = _of(Predicate, PREDICATE_FIELDS, special, "kind")
     derived = {"properties": {"kind": {"const": PredicateKind.DERIVED.value}}}
     defined = {"required": ["definition"]}
     return {**schema, "if": derived, "then": defined, "else": {"not": defined}}
 
 
 def _attribute() -> Schema:
-    return _object(
-        {
-            "values": {**_TEXTS, "minItems": 2, "uniqueItems": True},
-            "camera": _FLAG,
-            "lasting": _FLAG,
-            "mined": _FLAG,
-            "words": {"type": "string"},
-            "bins": {"type": "array", "items": _NUMBER},
-            "unit": {"type": "string"},
-            "phrases": _ref("phrases"),
-            "by_category": {"type": "object", "additionalProperties": _ref("phrases")},
-        },
-        "values",
-    )
+    special = {
+        "values": {**_TEXTS, "minItems": 2, "uniqueItems": True},
+        "phrases": _ref("phrases"),
+        "by_category": {"type": "object", "additionalProperties": _ref("phrases")},
+    }
+    return _of(Predicate, ATTRIBUTE_FIELDS, special, "values")
 
 
 def _category() -> Schema:
-    return {
+    special = {"tags": _TEXTS, "defaults": _NAMES}
+    schema = _of(Category, CATEGORY_FIELDS, special)
+    schema["properties"]["world"] = {
         "type": "object",
-        "properties": {
-            "tags": _TEXTS,
-            "attributes": _TEXTS,
-            "defaults": _NAMES,
-            "aliases": _TEXTS,
-            "words": {"type": "string"},
-            "synonyms": _TEXTS,
-            "world": {"type": "object", "description": "for a world; no other part reads it"},
-        },
+        "description": "for a world; no other part reads it",
+    }
+    return {
+        **schema,
         "additionalProperties": {
             "anyOf": [{"type": "integer"}, _TEXTS],
             "description": "a number, or what a static predicate (or its <name>_of) holds with",
@@ -188,50 +191,47 @@ def _category() -> Schema:
 
 
 def _skill() -> Schema:
-    return _object(
+    choice = _object(
         {
-            "like": {**_TEXT, "description": "a skill whose fields count where this has none"},
-            "parameters": _ref("parameters"),
-            "choices": {
-                "type": "array",
-                "items": _object(
-                    {
-                        "variable": _ref("parameter"),
-                        "among": {"type": "array", "items": _ref("formula")},
-                        "such_that": _ref("formula"),
-                        "only_if": _ref("formula"),
-                        "else": _TEXT,
-                    },
-                    "variable",
-                ),
-            },
-            "needs": _ref("needs"),
-            "prefers": {"type": "array", "items": _ref("formula")},
-            "effects": _ref("effects"),
-            "makes": {
-                "type": "array",
-                "items": _object(
-                    {
-                        "variable": _ref("parameter"),
-                        "source": _ref("parameter"),
-                        "by": _TEXT,
-                        "count": {"anyOf": [{"type": "integer", "minimum": 1}, _TEXT]},
-                    },
-                    "variable",
-                    "source",
-                    "by",
-                ),
-            },
-            "at": _ref("parameter"),
-            "drives": _FLAG,
-            "hand": _ref("parameter"),
-            "words": {"type": "string"},
-            "family": _TEXT,
-            "undoes": _ref("fact"),
-            "done_when": _ref("formula"),
-            "duration_s": {**_NUMBER, "minimum": 0},
-        }
+            "variable": _ref("parameter"),
+            "among": {"type": "array", "items": _ref("formula")},
+            "such_that": _ref("formula"),
+            "only_if": _ref("formula"),
+            "else": _TEXT,
+        },
+        "variable",
     )
+    make = _object(
+        {
+            "variable": _ref("parameter"),
+            "source": _ref("parameter"),
+            "by": _TEXT,
+            "count": {"anyOf": [{"type": "integer", "minimum": 1}, _TEXT]},
+        },
+        "variable",
+        "source",
+        "by",
+    )
+    special = {
+        "parameters": _ref("parameters"),
+        "choices": {"type": "array", "items": choice},
+        "needs": _ref("needs"),
+        "prefers": {"type": "array", "items": _ref("formula")},
+        "effects": _ref("effects"),
+        "makes": {"type": "array", "items": make},
+        "at": _ref("parameter"),
+        "hand": _ref("parameter"),
+        "family": _TEXT,
+        "undoes": _ref("fact"),
+        "done_when": _ref("formula"),
+        "duration_s": {**_NUMBER, "minimum": 0},
+    }
+    schema = _of(Skill, SKILL_FIELDS, special)
+    schema["properties"]["like"] = {
+        **_TEXT,
+        "description": "a skill whose fields count where this has none",
+    }
+    return schema
 
 
 def _object(properties: Schema, *required: str) -> Schema:

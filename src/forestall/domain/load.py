@@ -36,11 +36,22 @@ _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
     "skills", "processes", "safety", "constants", "spelling", "run",
 )  # fmt: skip
-_ATTRIBUTE = (
-    "values", "phrases", "by_category", "camera", "lasting", "mined", "bins", "unit", "words",
-    "material", "mechanical", "in_hand", "fine", "obscures", "says",
+_BOTH = ("camera", "mined", "words")
+_ATTRIBUTE_ONLY = (
+    "values", "phrases", "by_category", "says", "lasting", "bins", "unit", "material",
+    "mechanical", "in_hand", "fine", "obscures",
 )  # fmt: skip
-_CATEGORY = ("tags", "attributes", "defaults", "aliases", "words", "synonyms", "size_m", "world")
+_AS_IT_IS = ("mined", "unit", "words", "material", "mechanical", "in_hand", "fine", "obscures")
+
+ATTRIBUTE_FIELDS = (*_BOTH, *_ATTRIBUTE_ONLY)
+PREDICATE_FIELDS = tuple(
+    f.name for f in fields(Predicate) if f.name not in ("name", *_ATTRIBUTE_ONLY)
+)
+CATEGORY_FIELDS = tuple(
+    f.name for f in fields(Category) if f.name not in ("name", "numbers", "extra")
+)
+"""Fields of the three tables, which the export and the schema take from here; a category has also
+numbers, lists for statics, and "world"."""
 
 
 @cache
@@ -200,15 +211,13 @@ def _predicates(data: Mapping[str, Any]) -> dict[str, Predicate]:
 def _predicate(name: str, table: Any) -> Predicate:
     label = f"predicate {name}"
     table = dict(as_table(label, table))
-    known = {f.name for f in fields(Predicate)} - {"name", "values", "phrases", "by_category"}
-    _known(label, table, (*sorted(known), "inverse"))
+    _known(label, table, PREDICATE_FIELDS)
     kinds = {k.value: k for k in PredicateKind if k is not PredicateKind.ATTRIBUTE}
     kind = kinds.get(table.pop("kind", None) or "")
     if kind is None:
         raise InputError(f"{label}: kind must be one of {', '.join(kinds)}")
     if name in BUILT_IN:
         raise InputError(f"{label}: {name!r} is built in: choose another name")
-    table.pop("inverse", None)
     definition = table.pop("definition", None)
     if (kind is PredicateKind.DERIVED) != (definition is not None):
         raise InputError(f"{label}: a derived predicate, and no other, has a definition")
@@ -225,7 +234,7 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
     """One attribute; of one that exists only phrases can be given."""
     label = f"attribute {name}"
     table = as_table(label, table)
-    _known(label, table, _ATTRIBUTE)
+    _known(label, table, ATTRIBUTE_FIELDS)
     base = domain.attributes.get(name)
     if base is None and (name in domain.predicates or name in domain.skills or name in BUILT_IN):
         kind = "skill" if name in domain.skills else "built-in fact"
@@ -268,16 +277,9 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
         phrases=phrases,
         by_category=special,
         bins=bins,
-        unit=table.get("unit", start.unit),
-        words=table.get("words", start.words),
-        material=table.get("material", start.material),
-        mechanical=table.get("mechanical", start.mechanical),
-        in_hand=table.get("in_hand", start.in_hand),
-        fine=table.get("fine", start.fine),
-        obscures=table.get("obscures", start.obscures),
         says={**start.says, **as_table(f"{label}: says", table.get("says", {}))},
-        mined=table.get("mined", start.mined),
         lasting=table.get("lasting", start.lasting if base else bool(domain.categories)),
+        **{k: table[k] for k in _AS_IT_IS if k in table},
     )
 
 
@@ -292,7 +294,7 @@ def _category(name: str, table: Any, domain: Domain, base: Category | None) -> C
     for key, value in table.items():
         if isinstance(value, bool) and key in domain.tags:
             raise InputError(f'{label}: {key} is a tag: write tags = ["{key}"]')
-    _known(label, table, (*_CATEGORY, *statics, *inverse, *numbers))
+    _known(label, table, (*CATEGORY_FIELDS, "world", *statics, *inverse, *numbers))
     tags = _names(label, "tags", table)
     for tag in tags:
         if tag not in domain.tags:

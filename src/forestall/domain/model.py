@@ -218,6 +218,7 @@ class Choice:
         such_that: holds of the thing whichever of them decides.
         only_if: nothing is chosen where this does not hold.
         sentence: of the refusal.
+        decides: whether a need, an effect or another choice depends on it (found by the loader).
     """
 
     variable: Parameter
@@ -225,6 +226,7 @@ class Choice:
     such_that: Formula = TRUE
     only_if: Formula = TRUE
     sentence: str = ""
+    decides: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,6 +266,11 @@ class Skill:
     undoes: Literal | None = None
     done_when: Formula | None = None
     duration_s: float = 0.0
+
+    @property
+    def deciding(self) -> tuple[Choice, ...]:
+        """Choices on which needs or effects depend; the others only say where the robot ends up."""
+        return tuple(c for c in self.choices if c.decides)
 
     @property
     def roles(self) -> tuple[str, ...]:

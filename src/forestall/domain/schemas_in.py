@@ -7,9 +7,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
-from forestall.domain.formula import TRUE, And, Formula, Parameter, Some, bind, parse_formula
+from forestall.domain.formula import (
+    TRUE,
+    And,
+    Formula,
+    Parameter,
+    Some,
+    bind,
+    free,
+    parse_formula,
+)
 from forestall.domain.model import (
     Choice,
     Copy,
@@ -25,10 +35,9 @@ from forestall.domain.phrases import table as as_table
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import Literal
 
-_SKILL = (
-    "parameters", "choices", "needs", "prefers", "effects", "makes", "at", "drives", "hand",
-    "words", "family", "undoes", "done_when", "duration_s",
-)  # fmt: skip
+SKILL_FIELDS = tuple(f.name for f in fields(Skill) if f.name != "name")
+"""Fields of the table of a skill."""
+
 _COPY = re.compile(r"^\s*(\w+)\s*\(\s*(\?\w+)\s*\)\s*=\s*\1\s*\(\s*(\?\w+)\s*\)\s*$")
 _PARAMETER = re.compile(r"^\s*(\??)([A-Za-z_]\w*)(?:\s*-\s*([A-Za-z_]\w*))?\s*$")
 
@@ -52,12 +61,12 @@ def read_skill(name: str, table: Mapping[str, Any], events: Mapping[str, Any], d
         InputError: something in it cannot be read.
     """
     label = f"skill {name}"
-    _fields(label, table, _SKILL)
+    _fields(label, table, SKILL_FIELDS)
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(f"{label}: the name must be lower-case letters, digits and '_'")
     reader = _Effects(label, events, d)
     done = table.get("done_when")
-    return Skill(
+    skill = Skill(
         name,
         tuple(parameter(label, p) for p in _list(label, "parameters", table)),
         choices=tuple(_choice(label, c) for c in _list(label, "choices", table)),
@@ -74,6 +83,26 @@ def read_skill(name: str, table: Mapping[str, Any], events: Mapping[str, Any], d
         done_when=None if done is None else parse_formula(done),
         duration_s=float(table.get("duration_s", 0.0)),
     )
+    return replace(skill, choices=_weighed(skill))
+
+
+def _weighed(skill: Skill) -> tuple[Choice, ...]:
+    """The choices, each with whether anything but the robot's own place depends on it."""
+    formulas: list[Formula] = [n.formula for n in skill.needs]
+    formulas += [n.find for n in skill.needs if n.find is not None]
+    formulas += [*skill.prefers, *([skill.done_when] if skill.done_when is not None else [])]
+    formulas += [f for e in skill.effects for f in (e.condition, *e.facts)]
+    used = {name for f in formulas for name in free(f)}
+    used |= {x for e in skill.effects for c in e.copies for x in (c.target, c.source)}
+    used |= {x for e in skill.effects for x in e.gone}
+    weighed: list[Choice] = []
+    for choice in reversed(skill.choices):
+        decides = choice.variable.name in used
+        weighed.append(replace(choice, decides=decides))
+        if decides:
+            parts = (*choice.among, choice.such_that, choice.only_if)
+            used |= {name for f in parts for name in free(f)}
+    return tuple(reversed(weighed))
 
 
 def read_process(name: str, table: Any, events: Mapping[str, Any], d: Domain) -> Process:

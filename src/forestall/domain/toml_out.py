@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
 from forestall.domain.formula import TRUE, show
-from forestall.domain.load import chosen
+from forestall.domain.load import ATTRIBUTE_FIELDS, CATEGORY_FIELDS, PREDICATE_FIELDS, chosen
 from forestall.domain.model import (
     Category,
     Domain,
@@ -27,10 +27,10 @@ from forestall.domain.model import (
     SafetyRule,
     Skill,
 )
+from forestall.domain.schemas_in import SKILL_FIELDS
 
-_RELATION = ("camera", "contains", "group", "scored", "lasting", "paired", "mined", "words",
-             "opposite", "unit")  # fmt: skip
-_ATTRIBUTE = ("camera", "mined", "words", "bins", "unit")
+_OWN_FORM = ("parameters", "words", "family", "undoes", "done_when", "choices", "makes", "needs",
+             "prefers", "effects")  # fmt: skip
 
 Table = dict[str, Any]
 
@@ -46,6 +46,7 @@ def domain_toml(domain: Domain) -> str:
         text.append(f"tags = {_value(domain.tags)}")
     text += _table("roles", _given(domain.roles, [f.name for f in fields(Roles)]))
     text += _table("robot", _given(domain.robot, [f.name for f in fields(Robot)]))
+    text += _table("run", dict(domain.run))
     text += _table("constants", dict(domain.constants))
     text += _table("spelling", dict(domain.spelling))
     for p in domain.predicates.values():
@@ -65,13 +66,14 @@ def domain_toml(domain: Domain) -> str:
     return "\n".join(text) + "\n"
 
 
-def _given(part: object, names: list[str] | tuple[str, ...]) -> Table:
-    """Fields of a dataclass that are not at their default."""
+def _given(part: object, names: Iterable[str], written: Iterable[str] = ()) -> Table:
+    """Fields of a dataclass that are not at their default, but for those that are written."""
+    wanted = set(names) - set(written)
     found: Table = {}
     for f in fields(part):  # type: ignore[arg-type]
         value = getattr(part, f.name)
         default = f.default_factory() if f.default_factory is not MISSING else f.default
-        if f.name in names and value != default:
+        if f.name in wanted and value != default:
             found[f.name] = value
     return found
 
@@ -82,21 +84,17 @@ def _predicate(p: Predicate) -> Table:
         table["parameters"] = [str(x) for x in p.parameters]
     if p.definition is not None:
         table["definition"] = show(p.definition)
-    return table | _given(p, _RELATION)
+    return table | _given(p, PREDICATE_FIELDS, ("kind", "parameters", "definition"))
 
 
 def _attribute(p: Predicate) -> Table:
-    table: Table = {"values": p.values, "lasting": p.lasting, **_given(p, _ATTRIBUTE)}
-    if p.phrases:
-        table["phrases"] = dict(p.phrases)
-    if p.by_category:
-        table["by_category"] = {c: dict(t) for c, t in p.by_category.items()}
-    return table
+    table: Table = {"values": p.values, "lasting": p.lasting}
+    return table | _given(p, ATTRIBUTE_FIELDS, table)
 
 
 def _category(c: Category) -> Table:
     table: Table = {"tags": sorted(c.tags)} if c.tags else {}
-    table |= _given(c, ("attributes", "aliases", "words", "synonyms"))
+    table |= _given(c, CATEGORY_FIELDS, ("tags", "defaults"))
     if c.defaults:
         table["defaults"] = dict(c.defaults)
     table |= dict(c.numbers)
@@ -125,7 +123,7 @@ def _skill(s: Skill) -> Table:
         table["words"] = s.words
     if s.family != s.name:
         table["family"] = s.family
-    table |= _given(s, ("drives", "hand", "at", "duration_s"))
+    table |= _given(s, SKILL_FIELDS, _OWN_FORM)
     if s.undoes is not None:
         table["undoes"] = str(s.undoes)
     if s.done_when is not None:

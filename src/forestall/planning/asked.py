@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from forestall.domain.evaluate import static_holds
+from forestall.domain.evaluate import FALSE, TRUE, Circle, static_holds
+from forestall.domain.model import Predicate
 from forestall.planning.nodes import Node
 from forestall.planning.schemas import schemas_of
 
@@ -19,12 +20,13 @@ if TYPE_CHECKING:
 class Asked:
     """Implements `schemas.World` over one state."""
 
-    __slots__ = ("_kinds", "domain", "schemas", "state")
+    __slots__ = ("_circles", "_kinds", "domain", "schemas", "state")
 
     def __init__(self, state: State) -> None:
         self.state, self.domain = state, state.domain
         self.schemas = schemas_of(state.domain)
         self._kinds = state.kinds
+        self._circles: dict[frozenset[str], Circle] = {}
 
     def things(self) -> Sequence[str]:
         """Every thing."""
@@ -86,6 +88,20 @@ class Asked:
     def derived(self, predicate: str, args: tuple[str, ...]) -> Node:
         """Whether a derived fact holds."""
         known = self.domain.predicates[predicate]
+        members = self.domain.recursive.get(predicate)
+        if members is None:
+            return self._defined(known, args)
+        circle = self._circles.get(members)
+        if circle is not None:
+            return circle.ask(known, args) == TRUE
+        circle = Circle(lambda k, those: TRUE if self._defined(k, those) is True else FALSE)
+        self._circles[members] = circle
+        try:
+            return circle.settle(known, args) == TRUE
+        finally:
+            del self._circles[members]
+
+    def _defined(self, known: Predicate, args: tuple[str, ...]) -> Node:
         assert known.definition is not None
         names = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
         return self.schemas.formula(known.definition)(self, names)

@@ -25,7 +25,7 @@ class Choices:
     def bindings(self, skill: Skill, names: Names, first: Names) -> list[Names]:
         """Bindings with every thing that may be chosen."""
         several = [names]
-        for choice in skill.choices:
+        for choice in skill.deciding:
             several = [
                 {**b, **chosen}
                 for b in several

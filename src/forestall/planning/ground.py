@@ -37,7 +37,7 @@ class _SkillPlan:
         self.simple = simple_needs(domain, skill)
         self.relational = [e for e in skill.effects if adds_relation(domain, e)]
         self.stable = not any(asks_relation(domain, e.condition) for e in self.relational) and not (
-            skill.choices or skill.makes
+            skill.deciding or skill.makes
         )
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
 
@@ -206,7 +206,7 @@ class _Grounding:
         made = self._made(skill, names)
         first = {v: pieces[0] for v, pieces in made.items()}
         variants: list[tuple[Names, list[Node], str | None]] = [(names, [], None)]
-        for choice in skill.choices:
+        for choice in skill.deciding:
             variants = [
                 ({**b, **chosen}, [*nodes, node], over or faced)
                 for b, nodes, over in variants

@@ -138,7 +138,7 @@ class Possible(Grounder):
 
     def _chosen(self, way: Way, names: Names) -> Iterator[Names]:
         schema, several = way.schema, [names]
-        for choice in schema.choices if isinstance(schema, Skill) else ():
+        for choice in schema.deciding if isinstance(schema, Skill) else ():
             variable = choice.variable.name
             if variable in names:
                 continue

@@ -131,7 +131,7 @@ class _Closure:
         self.made[key] = tuple(sorted({*known, name}, key=by_number))
         self.keep((source,))
         skill = self.domain.skills[skill_name]
-        if skill.at == variable and any(skill.hand or c.only_if for c in skill.choices):
+        if skill.at == variable and any(skill.hand or c.only_if for c in skill.deciding):
             self.purposeful.add(source)
         make = next(m for m in skill.makes if m.variable == variable)
         for need in skill.needs:
@@ -290,7 +290,7 @@ class _Closure:
             conditions.append(way.schema.condition)
         else:
             conditions += [n.formula for n in way.schema.needs]
-            new |= {c.variable.name for c in way.schema.choices}
+            new |= {c.variable.name for c in way.schema.deciding}
         found = list(self.world.known_bindings(way, atom))
         if isinstance(way.what, Copy):
             copy = way.what
