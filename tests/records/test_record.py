@@ -251,6 +251,22 @@ def test_a_broken_value_is_told_with_file_and_place(tmp_path: Path, edit: Edit, 
     assert str(path) in str(caught.value)
 
 
+def test_skills_are_those_of_the_domain_where_that_can_be_known(tmp_path: Path) -> None:
+    """A domain that is not there, or another one of the same name, is no reason to refuse."""
+    path = write_record(tmp_path, records.potato_record())
+    data = json.loads(path.read_text("utf-8"))
+    data["boundaries"][7]["replan"]["plan"] = ["fly(Mug)"]
+    place = r"boundaries\[7\].replan.plan\[0\]: unknown skill"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FileFormatError, match=place):
+        read_record(tmp_path)
+    for edit in ({"domain": "warehouse"}, {"task_plan": ["fly(Mug)"]}):
+        path.write_text(json.dumps({**data, **edit}), encoding="utf-8")
+        found = read_record(tmp_path).boundaries[7].replan
+        assert found is not None and found.plan is not None
+        assert found.plan.texts() == ["fly(Mug)"]
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

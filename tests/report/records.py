@@ -75,6 +75,7 @@ def task() -> Task:
         ),
         plan=Plan.parse(NOMINAL),
         scene=SceneNeeds(),
+        domain="household",
     )
 
 

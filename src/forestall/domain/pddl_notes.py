@@ -12,18 +12,24 @@ from dataclasses import dataclass
 from typing import Any
 
 from forestall.domain.formula import parse_formula, show
+from forestall.domain.load import ATTRIBUTE_FIELDS, CATEGORY_FIELDS, PREDICATE_FIELDS
 from forestall.domain.located import keyed, located
 from forestall.domain.phrases import table as as_table
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 
+
+def _but(names: Iterable[str], *given_by_pddl: str) -> tuple[str, ...]:
+    return tuple(n for n in names if n not in given_by_pddl)
+
+
 _FIELDS = {
-    "predicates": ("camera", "contains", "group", "mined", "opposite", "scored", "words"),
-    "attributes": ("by_category", "camera", "lasting", "mined", "phrases", "values", "words"),
-    "categories": ("aliases", "synonyms", "tags", "words", "world"),
+    "predicates": _but(PREDICATE_FIELDS, "kind", "parameters", "definition", "paired"),
+    "attributes": ATTRIBUTE_FIELDS,
+    "categories": (*_but(CATEGORY_FIELDS, "attributes", "defaults"), "world"),
     "skills": ("at", "done_when", "drives", "duration_s", "family", "hand", "prefers", "refusals",
                "undoes", "words"),
 }  # fmt: skip
-_WHOLE = ("name", "processes", "robot", "roles", "safety", "tags")
+_WHOLE = ("name", "processes", "robot", "roles", "run", "safety", "tags")
 
 
 @dataclass(frozen=True, slots=True)

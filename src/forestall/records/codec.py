@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from forestall.errors import FileFormatError
+from forestall.domain.load import shipped, shipped_names
+from forestall.errors import FileFormatError, InputError
 from forestall.records.boundaries import (
     boundary_from,
     boundary_json,
@@ -23,6 +24,7 @@ from forestall.records.derived import (
     Alarm,
     alarms,
     moments,
+    new_plan,
     provenance_of,
     reasoning_s,
     replans,
@@ -31,6 +33,7 @@ from forestall.records.fields import Field
 from forestall.records.plain import plain
 from forestall.records.verdicts import graph, literal, plan
 from forestall.types.episode import EpisodeEnd, EpisodeRecord
+from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
 
@@ -97,7 +100,7 @@ def record_from_json(data: Any) -> EpisodeRecord:
     if missing:
         raise FileFormatError(f"the record lacks {', '.join(missing)}")
     end = field.maybe("end", lambda f: f.member(EpisodeEnd))
-    return EpisodeRecord(
+    record = EpisodeRecord(
         task=_task(field),
         scenario=field.maybe("scenario", Field.text),
         strategy=field["strategy"].text(),
@@ -116,6 +119,34 @@ def record_from_json(data: Any) -> EpisodeRecord:
         final=field.maybe("final", graph),
         provenance=field["provenance"].pairs(lambda f: f.value),
     )
+    _check_skills(record, field)
+    return record
+
+
+def _check_skills(record: EpisodeRecord, field: Field) -> None:
+    """See that plans that were followed fit the domain, where it is a shipped one.
+
+    A file of one's own may call its domain like a shipped one: where the plan of the task or what
+    was executed does not fit, this is no domain to check against.
+    """
+
+    def check(step: Field) -> None:
+        step.parsed(lambda text: domain.check(Subtask.parse(text)))
+
+    if record.task.domain not in shipped_names():
+        return
+    domain = shipped(record.task.domain)
+    try:
+        domain.check_plan(record.task.plan)
+        for done in record.executed:
+            domain.check(done.subtask)
+    except InputError:
+        return
+    field["initial_plan"].tuple_of(check)
+    for place, boundary in zip(field["boundaries"].items(), record.boundaries, strict=True):
+        check(place["subtask"])
+        if new_plan(boundary.replan) is not None:
+            place["replan"]["plan"].tuple_of(check)
 
 
 def check_header(data: Any) -> None:
