@@ -29,10 +29,10 @@ class FlatWorlds:
 
     @contextmanager
     def open(
-        self, needs: SceneNeeds, vocabulary: Domain, remember: bool = False
+        self, needs: SceneNeeds, domain: Domain, remember: bool = False
     ) -> Iterator[OpenKitchen]:
         self.opened.append(remember)
-        yield OpenKitchen(flat_environment(needs, vocabulary))
+        yield OpenKitchen(flat_environment(needs, domain))
 
     def check(self) -> Sequence[Working]:
         return ()
@@ -43,7 +43,7 @@ class TruthPerceiver:
 
     def __init__(self, parts: Parts) -> None:
         self._oracle: OracleView = parts.lent("truth")
-        self._vocabulary = parts.vocabulary
+        self._domain = parts.domain
 
     def reset(self) -> None:
         pass
@@ -52,7 +52,7 @@ class TruthPerceiver:
         return self._oracle.truth()
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
-        return scope(graph, subtask, self._vocabulary, ScopeConfig())
+        return scope(graph, subtask, self._domain, ScopeConfig())
 
     def describe(self) -> Mapping[str, str]:
         return {"segmenter": "truth", "state_estimator": "truth"}

@@ -35,7 +35,7 @@ class Calm:
 
 def borrowing(parts, *, patience: int = 3):
     made = Calm()
-    made.words, made.patience = len(parts.vocabulary.categories), patience
+    made.words, made.patience = len(parts.domain.categories), patience
     return made
 
 

@@ -13,7 +13,7 @@ from forestall.planning.goals import alternatives
 from forestall.planning.planner import plan_goal, plan_to
 from forestall.planning.state import State
 from forestall.types.facts import Literal
-from forestall.types.plan import SKILLS, Subtask
+from forestall.types.plan import Subtask
 from forestall.types.task import Goal
 from forestall.types.verdict import ReplanOutcome
 
@@ -124,18 +124,6 @@ effects = ["lamp(?bay)=green"]
 """
 
 
-@pytest.fixture(autouse=True)
-def _skills(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, roles in {
-        "load": ("thing", "cart", "bay"),
-        "unload": ("thing", "cart", "bay"),
-        "roll": ("cart", "start", "end"),
-        "seal_all": ("bay",),
-        "pack": ("thing", "bay"),
-    }.items():
-        monkeypatch.setitem(SKILLS, name, roles)
-
-
 @pytest.fixture(scope="module")
 def depot() -> Domain:
     return read_domain(TEXT, "depot.toml")
@@ -210,12 +198,8 @@ def test_what_is_bolted_down_stays(depot: Domain) -> None:
     assert planned.outcome is not ReplanOutcome.SOLVED
 
 
-def test_unknown_skill_and_arity_are_refusals(
-    depot: Domain, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(SKILLS, "fly", ("thing",))
+def test_unknown_skill_and_arity_are_refusals(depot: Domain) -> None:
     assert isinstance(apply(yard(depot), Subtask("fly", ("Cart-1",))), Refusal)
-    monkeypatch.setitem(SKILLS, "load", ("thing",))
     assert isinstance(apply(yard(depot), Subtask("load", ("Crate-1",))), Refusal)
 
 

@@ -38,7 +38,7 @@ def demonstration_from(
     perception = dict(record.provenance).get("perception", {})
     return Demonstration(
         task=record.task.name,
-        scene=f"{record.task.scene.room}-{record.seed}",
+        scene=f"{record.task.scene.room or record.task.domain}-{record.seed}",
         seed=record.seed,
         steps=tuple(
             DemonstrationStep(

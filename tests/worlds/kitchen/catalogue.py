@@ -54,6 +54,12 @@ TAGS: Mapping[str, Callable[[Category], bool]] = {
     "brews": lambda c: bool(_device(c, "brews") and _device(c, "fills") == "coffee"),
     "needs_closed": lambda c: bool(_device(c, "needs_closed")),
     "shut_while_on": lambda c: bool(_device(c, "shut_while_on")),
+    "crowded": lambda c: c.name in ("Cabinet", "Drawer", "Fridge", "GarbageCan", "Sink"),
+    "vacatable": lambda c: (
+        c.receptacle is not None
+        and (c.receptacle.capacity is not None or c.shape.get("kind") in ("dish", "vessel"))
+    ),
+    "numbered": lambda c: c.name in ("StoveBurner", "StoveKnob"),
     "remote_controlled": lambda c: _device(c, "needs_held") == "RemoteControl",
 }
 """Tag → the categories of the catalogue that must carry it."""
@@ -87,10 +93,8 @@ def differences(domain: Domain, vocabulary: Catalogue) -> Iterator[str]:
             yield f"{name}: defaults {domain.default_states(name)}"
     for attribute, known in vocabulary.attributes.items():
         mine = domain.attributes.get(attribute)
-        if mine is None or (mine.values, mine.camera) != (known.values, known.camera):
-            yield f"attribute {attribute}: values or camera"
-        elif (mine.phrases, mine.by_category) != (known.phrases, known.by_category):
-            yield f"attribute {attribute}: phrases"
+        if mine is None or mine.values != known:
+            yield f"attribute {attribute}: values"
     if set(domain.lasting) != set(vocabulary.lasting):
         yield f"lasting: {domain.lasting}, the catalogue has {vocabulary.lasting}"
     for predicate, pairs in _pairs(vocabulary).items():
@@ -107,8 +111,6 @@ def _of_category(domain: Domain, name: str, theirs: Category) -> Iterator[str]:
     expected = {
         "attributes": set(theirs.attributes),
         "aliases": set(theirs.aliases),
-        "words": theirs.words,
-        "synonyms": theirs.synonyms,
         "tags": {t for t, holds in TAGS.items() if holds(theirs)},
         "numbers": {k: v for k, v in numbers.items() if v is not None},
     }

@@ -120,7 +120,11 @@ def truth(kitchen: SmallKitchen) -> dict[Any, Any]:
     """Everything that is so in the kitchen."""
     graph = kitchen.env.oracle.truth()
     facts: dict[Any, Any] = {(n.id, a): v for n in graph.nodes for a, v in n.states}
-    facts |= {(n.id, "parent"): graph.parents(n.id) for n in graph.nodes if n.id != GRIPPER}
+    facts |= {
+        (n.id, "parent"): graph.parents(n.id, ("inside", "on_top_of"))
+        for n in graph.nodes
+        if n.id != GRIPPER
+    }
     places = {(r.subject, r.predicate, r.object) for r in graph.relations}
     return facts | {"held": graph.holding, "spoiled": kitchen.spoiled, "relations": places}
 

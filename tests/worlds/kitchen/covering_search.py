@@ -33,6 +33,7 @@ from forestall.planning.execute import Refusal, apply
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
+from forestall.worlds.kitchen.catalogue import Catalogue, shipped_catalogue
 
 THINGS = (
     "Mug-1", "Mug-2", "Cup-1", "Bowl-1", "Bowl-2", "Plate-1", "Plate-2", "Pot-1", "Pan-1",
@@ -51,7 +52,7 @@ SOMETIMES = ("Sink-2", "Faucet-2", "Faucet-3", "StoveKnob-7", "Fridge-2")
 STEPS = 40
 
 
-def start(rng: np.random.Generator, vocabulary: Domain) -> Episode:
+def start(rng: np.random.Generator, vocabulary: Catalogue) -> Episode:
     """Some things at places that take them, in any states, some in front of others."""
     extra = [f for f in SOMETIMES if rng.random() < 0.15]
     fixtures = [*FIXTURES, *(f for f in extra if vocabulary[f].receptacle is not None)]
@@ -85,7 +86,7 @@ def start(rng: np.random.Generator, vocabulary: Domain) -> Episode:
     return Episode(tuple(shown), blocked)
 
 
-def _states(rng: np.random.Generator, name: str, vocabulary: Domain, share: float) -> str:
+def _states(rng: np.random.Generator, name: str, vocabulary: Catalogue, share: float) -> str:
     found = ""
     for attribute, default in vocabulary.default_states(name).items():
         if attribute in ("sliced", "broken"):
@@ -190,7 +191,7 @@ def search(seconds: float, seed: int, domain: Domain, left: list[Mutant]) -> lis
     """Episodes that cover what they can in a time, and kill what they can of some mutants."""
     rng, vocabulary, end = (
         np.random.default_rng(seed),
-        shipped("household"),
+        shipped_catalogue(),
         time.monotonic() + seconds,
     )
     coverage, corpus = Coverage(domain), load_corpus() if CORPUS.exists() else []

@@ -27,6 +27,7 @@ from mutants import Mutant, kills, mutants
 
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
+from forestall.worlds.kitchen.catalogue import shipped_catalogue
 
 
 def played(domain: Domain) -> list[list[Step]]:
@@ -41,7 +42,7 @@ def survivors(several: Iterable[Mutant], episodes: Sequence[Sequence[Step]]) -> 
 
 def main() -> int:
     """Print the survivors."""
-    domain, catalogue = shipped("household"), shipped("household")
+    domain, catalogue = shipped("household"), shipped_catalogue()
     rules, facts = list(mutants(domain)), list(lacking(domain))
     alive = survivors(rules, played(domain))
     alive += [str(m) for m in facts if not any(True for _ in differences(m.domain, catalogue))]

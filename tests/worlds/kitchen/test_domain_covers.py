@@ -18,6 +18,7 @@ from mutants import mutants
 from mutate_domain import survivors
 
 from forestall.domain.load import shipped
+from forestall.worlds.kitchen.catalogue import shipped_catalogue
 
 DOMAIN = shipped("household")
 
@@ -55,7 +56,7 @@ def test_what_is_called_unreachable_is_still_a_case_and_still_not_reached():
 @pytest.mark.parametrize("seed", range(12))
 def test_fresh_walks_agree_and_reach_nothing_that_is_called_unreachable(seed):
     rng, coverage = np.random.default_rng((7, seed)), Coverage(DOMAIN)
-    run = Run(start(rng, shipped("household")), DOMAIN)
+    run = Run(start(rng, shipped_catalogue()), DOMAIN)
     agenda = []
     for _ in range(30):
         agenda = agenda or intended(rng, run.state)
@@ -80,13 +81,13 @@ def test_equivalent_mutants_are_mutants():
 
 
 def test_categories_are_those_of_the_kitchen():
-    assert list(differences(DOMAIN, shipped("household"))) == []
+    assert list(differences(DOMAIN, shipped_catalogue())) == []
     assert set(TAGS) == set(DOMAIN.tags)
 
 
 def test_no_tag_attribute_default_number_or_static_fact_can_be_left_out():
     told = {
-        str(m): any(True for _ in differences(m.domain, shipped("household")))
+        str(m): any(True for _ in differences(m.domain, shipped_catalogue()))
         for m in lacking(DOMAIN)
     }
     assert len(told) > 400
