@@ -301,7 +301,8 @@ class _Closure:
                 for b in found
                 if self.state.value(b[copy.source], copy.attribute) == literal.value
             ]
-            movable = self.domain.is_a(self.world.categories.get(atom[1], atom[1]), self.domain.roles.movable)
+            kind = self.world.categories.get(atom[1], atom[1])
+            movable = self.domain.is_a(kind, self.domain.roles.movable)
             found = having if having or movable else found
         hand = way.schema.hand if isinstance(way.schema, Skill) else None
         most = GROUPS if isinstance(way.schema, Process) or hand in new else 1
