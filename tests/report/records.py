@@ -74,7 +74,7 @@ def task() -> Task:
             weak=(Literal.parse("cooked(?potato)=cooked"),),
         ),
         plan=Plan.parse(NOMINAL),
-        scene=SceneNeeds(),
+        scene=SceneNeeds("kitchen"),
         domain="household",
     )
 

@@ -33,7 +33,7 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
     - accessible(?x) for what can be picked up; unblocked(?x) for what of it the skill needs clear;
     - held_by(?x, gripper), hand_empty(), and held_by(Lettuce, gripper) for what is no argument;
     - inside(?object, ?target) and on_top_of(?object, ?target), or their negations;
-    - contents by category, inside(Potato, ?target), but not of tables, counters and shelves.
+    - contents by category, but not of supports, on which many things merely stand.
 
     An argument that is a category name and no node of the graph has no true literal.
     """

@@ -31,7 +31,7 @@ Label = tuple[str, tuple[tuple[str, str], ...], str]
 
 
 def without_numbers(text: str) -> str:
-    """Instance numbers taken out of a text: "put in Plate-1 Microwave-2" → "put in Plate ..."."""
+    """Instance numbers taken out of a text: "insert Peg-1 Hole-2" → "insert Peg Hole"."""
     return _NUMBER.sub("", text)
 
 

@@ -696,12 +696,12 @@ class Domain:
         return plan
 
     def bound(self, step: Subtask) -> dict[str, str]:
-        """Variable → argument, e.g. {"?object": "Plate-1", "?target": "Microwave-1"}."""
+        """Variable → argument, e.g. {"?peg": "Peg-1", "?hole": "Hole-2"}."""
         skill = self.skill(step.skill)
         return {p.name: a for p, a in zip(skill.parameters, step.args, strict=True)}
 
     def words(self, step: Subtask) -> str:
-        """The subtask as a phrase: "put in Plate Microwave"."""
+        """The subtask as a phrase: "insert Peg Hole"."""
         skill = self.skills.get(step.skill)
         verb = skill.words if skill is not None and skill.words else step.skill.replace("_", " ")
         return " ".join((verb, *step.args))

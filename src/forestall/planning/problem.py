@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from forestall.types.plan import Subtask
 
 Atom = tuple[str, ...]
-"""A ground fact, e.g. ("inside", "Mug-1", "Sink-1") or ("dirty", "Mug-1", "clean");
+"""A ground fact, e.g. ("seated_in", "Peg-1", "Hole-1") or ("dirt", "Peg-1", "clean");
 ("not", *atom) is its complement, ("aux", n) an auxiliary fact that rules derive."""
 
 ROUNDS = 50

@@ -292,7 +292,7 @@ def done_before(record: EpisodeRecord, boundary: BoundaryRecord) -> tuple[Execut
 
 
 def in_words(when: When) -> str:
-    """How a moment is said before the name of its subtask: "after put_on(Mug, Sink)"."""
+    """How a moment is said before the name of its subtask: "after insert(Peg, Hole)"."""
     return "at the end, after" if when is When.END else when.value
 
 
