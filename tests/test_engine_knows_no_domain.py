@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from forestall.domain.load import shipped, shipped_names
-from forestall.domain.model import Domain, PredicateKind, Roles
+from forestall.domain.model import Domain
+from forestall.domain.schema import PredicateKind, Roles
 
 ROOT = Path(__file__).parent.parent / "src" / "forestall"
 

@@ -24,7 +24,7 @@ from forestall.domain.load import (
     shipped,
     shipped_names,
 )
-from forestall.domain.model import Category, Predicate, PredicateKind, Skill
+from forestall.domain.schema import Category, Predicate, PredicateKind, Skill
 from forestall.domain.schemas_in import SKILL_FIELDS
 from forestall.domain.sheet import skill_sheet, skill_words, words_of
 from forestall.domain.toml_out import domain_toml

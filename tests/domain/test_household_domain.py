@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from forestall.domain.load import extend, shipped
-from forestall.domain.model import Domain, PredicateKind
+from forestall.domain.model import Domain
+from forestall.domain.schema import PredicateKind
 from forestall.errors import InputError, UnknownNameError
 from forestall.worlds.kitchen.catalogue import Catalogue, catalogue, shipped_catalogue
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from forestall.domain.load import shipped
-from forestall.domain.model import Robot
+from forestall.domain.schema import Robot
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.plan import Plan, Subtask
 

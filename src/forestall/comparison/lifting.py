@@ -9,7 +9,8 @@ from __future__ import annotations
 from enum import Enum
 
 from forestall.domain.formula import literals
-from forestall.domain.model import Domain, Skill
+from forestall.domain.model import Domain
+from forestall.domain.schema import Skill
 from forestall.domain.truth import truth
 from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import SceneGraph

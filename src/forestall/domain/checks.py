@@ -11,19 +11,8 @@ from dataclasses import fields
 
 from forestall.domain.formula import Formula, Parameter, free, literals, variables
 from forestall.domain.located import keyed
-from forestall.domain.model import (
-    BUILT_IN,
-    FACING,
-    LOCATED,
-    SAME,
-    SAME_CATEGORY,
-    Domain,
-    Effect,
-    Predicate,
-    PredicateKind,
-    Roles,
-    Skill,
-)
+from forestall.domain.model import BUILT_IN, FACING, LOCATED, SAME, SAME_CATEGORY, Domain
+from forestall.domain.schema import Effect, Predicate, PredicateKind, Roles, Skill
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import Literal
 

@@ -23,15 +23,8 @@ from forestall.domain.formula import (
     free,
     normal,
 )
-from forestall.domain.model import (
-    FACING,
-    LOCATED,
-    SAME,
-    SAME_CATEGORY,
-    Domain,
-    Predicate,
-    PredicateKind,
-)
+from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain
+from forestall.domain.schema import Predicate, PredicateKind
 from forestall.types.facts import Literal, category_of, is_instance
 
 FALSE, UNOBSERVED, TRUE = 0, 1, 2

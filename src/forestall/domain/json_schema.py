@@ -11,7 +11,7 @@ from dataclasses import fields
 from typing import Any
 
 from forestall.domain.load import ATTRIBUTE_FIELDS, CATEGORY_FIELDS, PREDICATE_FIELDS
-from forestall.domain.model import Category, Predicate, PredicateKind, Roles, Skill
+from forestall.domain.schema import Category, Predicate, PredicateKind, Roles, Skill
 from forestall.domain.schemas_in import SKILL_FIELDS
 
 Schema = dict[str, Any]

@@ -18,17 +18,10 @@ from typing import Any
 from forestall.domain.checks import check_domain
 from forestall.domain.formula import parse_formula
 from forestall.domain.located import keyed, located
-from forestall.domain.model import (
-    BUILT_IN,
-    Category,
-    Domain,
-    Predicate,
-    PredicateKind,
-    Robot,
-    Roles,
-)
+from forestall.domain.model import BUILT_IN, Domain
 from forestall.domain.phrases import attribute_values, check_apart, check_text, phrase_table, texts
 from forestall.domain.phrases import table as as_table
+from forestall.domain.schema import Category, Predicate, PredicateKind, Robot, Roles
 from forestall.domain.schemas_in import parameter, read_process, read_safety, read_skill
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 

@@ -11,7 +11,8 @@ import math
 from collections.abc import Mapping
 
 from forestall.domain.formula import literals
-from forestall.domain.model import Domain, Skill
+from forestall.domain.model import Domain
+from forestall.domain.schema import Skill
 from forestall.domain.truth import view
 from forestall.types.facts import Literal, Truth, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph

@@ -26,19 +26,11 @@ from forestall.domain.formula import (
     bind,
     literals,
 )
-from forestall.domain.model import (
-    FACING,
-    LOCATED,
-    SAME_CATEGORY,
-    Choice,
-    Domain,
-    Effect,
-    PredicateKind,
-    Skill,
-)
+from forestall.domain.model import FACING, LOCATED, SAME_CATEGORY, Domain
 from forestall.domain.pddl_problem import types_of
 from forestall.domain.pddl_text import ROOT
 from forestall.domain.pddl_write import THING, Writer, without
+from forestall.domain.schema import Choice, Effect, PredicateKind, Skill
 from forestall.errors import DomainError, UnknownNameError
 from forestall.types.facts import Literal
 

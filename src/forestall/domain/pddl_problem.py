@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from forestall.domain.formula import Formula, variables
-from forestall.domain.model import Domain, PredicateKind
+from forestall.domain.model import Domain
 from forestall.domain.pddl_declared import differing, plain, things_of, value_key
 from forestall.domain.pddl_formula import Reader, Value
 from forestall.domain.pddl_text import (
@@ -21,6 +21,7 @@ from forestall.domain.pddl_text import (
     definition,
     unknown,
 )
+from forestall.domain.schema import PredicateKind
 from forestall.errors import DomainError
 from forestall.types.facts import Literal
 

@@ -27,9 +27,10 @@ from forestall.domain.formula import (
     literals,
     normal,
 )
-from forestall.domain.model import SAME, Domain, Effect, PredicateKind
+from forestall.domain.model import SAME, Domain
 from forestall.domain.pddl_declared import value_key
 from forestall.domain.pddl_text import ROOT
+from forestall.domain.schema import Effect, PredicateKind
 from forestall.errors import DomainError
 from forestall.types.facts import Literal
 

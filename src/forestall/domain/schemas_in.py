@@ -20,18 +20,9 @@ from forestall.domain.formula import (
     free,
     parse_formula,
 )
-from forestall.domain.model import (
-    Choice,
-    Copy,
-    Domain,
-    Effect,
-    Make,
-    Need,
-    Process,
-    SafetyRule,
-    Skill,
-)
+from forestall.domain.model import Domain
 from forestall.domain.phrases import table as as_table
+from forestall.domain.schema import Choice, Copy, Effect, Make, Need, Process, SafetyRule, Skill
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import Literal
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from forestall.domain.formula import literals, normal
 from forestall.domain.located import keyed
-from forestall.domain.model import Domain, Process
+from forestall.domain.model import Domain
+from forestall.domain.schema import Process
 from forestall.errors import InputError
 from forestall.types.facts import Literal
 

@@ -20,19 +20,9 @@ from forestall.domain.formula import (
     Parameter,
     Some,
 )
-from forestall.domain.model import (
-    FACING,
-    LOCATED,
-    SAME,
-    SAME_CATEGORY,
-    Copy,
-    Domain,
-    Effect,
-    Make,
-    PredicateKind,
-    Skill,
-)
+from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain
 from forestall.domain.phrases import with_articles
+from forestall.domain.schema import Copy, Effect, Make, PredicateKind, Skill
 from forestall.types.facts import Literal
 
 _BUILT_IN = {

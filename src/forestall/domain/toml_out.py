@@ -14,9 +14,9 @@ from typing import Any
 
 from forestall.domain.formula import TRUE, show
 from forestall.domain.load import ATTRIBUTE_FIELDS, CATEGORY_FIELDS, PREDICATE_FIELDS, chosen
-from forestall.domain.model import (
+from forestall.domain.model import Domain
+from forestall.domain.schema import (
     Category,
-    Domain,
     Effect,
     Need,
     Predicate,

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Mapping
 
 from forestall.domain.evaluate import FALSE, TRUE, UNKNOWN, UNOBSERVED, evaluate, literal_truth
 from forestall.domain.formula import Formula
-from forestall.domain.model import FACING, LOCATED, Domain, PredicateKind
+from forestall.domain.model import FACING, LOCATED, Domain
+from forestall.domain.schema import PredicateKind
 from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from forestall.domain.evaluate import FALSE, TRUE, Circle, static_holds
-from forestall.domain.model import Predicate
+from forestall.domain.schema import Predicate
 from forestall.planning.nodes import Node
 from forestall.planning.schemas import schemas_of
 

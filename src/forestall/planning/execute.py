@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from forestall.domain.evaluate import TRUE, by_number, solutions
 from forestall.domain.formula import Every, Fewer, Formula, Not, Or, Some, bind, free, normal
-from forestall.domain.model import LOCATED, Choice, Effect, Need, Skill
+from forestall.domain.model import LOCATED
+from forestall.domain.schema import Choice, Effect, Need, Skill
 from forestall.errors import InputError
 from forestall.planning.settle import change, settle
 from forestall.planning.state import State

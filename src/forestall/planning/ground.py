@@ -12,7 +12,8 @@ from math import inf
 
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Not, free
-from forestall.domain.model import Domain, Effect, PredicateKind, Skill
+from forestall.domain.model import Domain
+from forestall.domain.schema import Effect, PredicateKind, Skill
 from forestall.planning.choices import Choices
 from forestall.planning.drafts import Change, Draft, Event, Grounding
 from forestall.planning.execute import mentions

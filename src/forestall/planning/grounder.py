@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 from forestall.domain.evaluate import static_holds
 from forestall.domain.formula import TRUE, literals
-from forestall.domain.model import SAME, SAME_CATEGORY, Domain, PredicateKind
+from forestall.domain.model import SAME, SAME_CATEGORY, Domain
+from forestall.domain.schema import PredicateKind
 from forestall.planning.nodes import Junction, Node, all_of, assuming
 from forestall.planning.problem import Atom
 from forestall.planning.schemas import Schemas

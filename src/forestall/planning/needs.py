@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from forestall.domain.formula import And, Formula, Not, Some, free, literals, normal
-from forestall.domain.model import FACING, Domain, Effect, PredicateKind, Skill
+from forestall.domain.model import FACING, Domain
+from forestall.domain.schema import Effect, PredicateKind, Skill
 from forestall.types.facts import Literal
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from forestall.domain.formula import And, Formula
-from forestall.domain.model import PredicateKind
+from forestall.domain.schema import PredicateKind
 from forestall.errors import InputError
 from forestall.planning.drafts import Change, Draft, Event, Grounding
 from forestall.planning.nodes import Junction, Node, facts_of

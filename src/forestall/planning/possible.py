@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Formula
-from forestall.domain.model import Copy, Domain, Effect, Process, Skill
+from forestall.domain.model import Domain
+from forestall.domain.schema import Copy, Effect, Process, Skill
 from forestall.planning.goals import Made
 from forestall.planning.grounder import Grounder, Universe
 from forestall.planning.needs import plain_parts, simple_needs

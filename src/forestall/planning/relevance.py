@@ -20,7 +20,7 @@ from forestall.domain.formula import (
     Some,
     normal,
 )
-from forestall.domain.model import Copy, PredicateKind, Process, Skill
+from forestall.domain.schema import Copy, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, makeable
 from forestall.planning.grounder import Universe
 from forestall.planning.possible import Names, Way, possible

@@ -20,7 +20,8 @@ from forestall.domain.formula import (
     free,
     normal,
 )
-from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain, PredicateKind
+from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain
+from forestall.domain.schema import PredicateKind
 from forestall.planning.nodes import Node, all_of, any_of, at_least, negate
 from forestall.planning.world import Names, World
 from forestall.types.facts import Literal

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from forestall.domain.formula import TRUE, Formula, literals
-from forestall.domain.model import Domain, Effect
+from forestall.domain.model import Domain
+from forestall.domain.schema import Effect
 from forestall.errors import DomainError
 from forestall.planning.state import State
 from forestall.types.facts import Literal

@@ -12,7 +12,8 @@ from typing import TypeVar
 
 from forestall.domain.evaluate import TRUE, by_number, literal_truth, number_of
 from forestall.domain.formula import Formula, Parameter
-from forestall.domain.model import FACING, LOCATED, Category, Domain, PredicateKind
+from forestall.domain.model import FACING, LOCATED, Domain
+from forestall.domain.schema import Category, PredicateKind
 from forestall.planning.asked import Asked
 from forestall.planning.places import Place, crowded, places
 from forestall.types.facts import Literal, category_of, is_instance

@@ -12,7 +12,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from forestall.domain.evaluate import by_number
-from forestall.domain.model import Domain, PredicateKind
+from forestall.domain.model import Domain
+from forestall.domain.schema import PredicateKind
 from forestall.planning.execute import Refusal, apply, resolve
 from forestall.planning.state import State
 from forestall.testing.symbolic_scene import relation_at, start_scene

@@ -28,7 +28,8 @@ from mutants import Mutant, kills, mutants
 from forestall.domain.evaluate import TRUE, evaluate
 from forestall.domain.formula import free
 from forestall.domain.load import shipped
-from forestall.domain.model import Domain, Skill
+from forestall.domain.model import Domain
+from forestall.domain.schema import Skill
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.state import State
 from forestall.types.facts import Literal

@@ -24,7 +24,8 @@ from forestall.domain.formula import (
     normal,
     show,
 )
-from forestall.domain.model import Choice, Domain, Effect, Make, Process, Skill
+from forestall.domain.model import Domain
+from forestall.domain.schema import Choice, Effect, Make, Process, Skill
 from forestall.errors import ForestallError
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.settle import settle

@@ -15,8 +15,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from forestall.domain.model import Category as Described
 from forestall.domain.model import Domain
+from forestall.domain.schema import Category as Described
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import category_of
 
