@@ -36,7 +36,7 @@ from forestall.worlds.kitchen.flat_world import flat_environment
 
 NAMES = scenario_names("irreversible")
 SEEDS = (1, 2)
-QUICK = SearchConfig(time_limit_s=1.0, max_expansions=1500)
+QUICK = SearchConfig(time_limit_s=30.0, max_expansions=1500)
 
 
 @dataclass
