@@ -113,7 +113,7 @@ class _Always(dict):
 def unsettled(state: State, subtask: Subtask) -> State | Refusal:
     """What a skill does, without what happens by itself."""
     with patch.object(execute, "settle", lambda state: None):
-        return execute.apply(state, subtask)
+        return execute.apply(state.copy(), subtask)
 
 
 def truth(kitchen: SmallKitchen) -> dict[Any, Any]:
