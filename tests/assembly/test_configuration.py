@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,16 @@ from forestall.assembly.parts import Assembly
 from forestall.cli.flags import RunFlags, spelt
 from forestall.domain.load import shipped
 from forestall.errors import FileFormatError, InputError
-from forestall.kinds import DETECTOR, PERCEIVER, REASONER, REPLANNER, STORE, TEXT_ENCODER, WORLD
+from forestall.kinds import (
+    DETECTOR,
+    DOMAIN,
+    PERCEIVER,
+    REASONER,
+    REPLANNER,
+    STORE,
+    TEXT_ENCODER,
+    WORLD,
+)
 
 FILE = """
 seed = 7
@@ -139,3 +149,15 @@ def test_what_was_said_of_one_part_is_said_once() -> None:
     one = Given.named({"detector.threshold": 0.5, "states": "clip"})
     assert one == Given.named({"states": "clip", "threshold": 0.5})
     assert one.over(Given.named({"threshold": 0.9})) == one
+
+
+def test_a_run_is_of_its_tasks_domain_and_says_so(tmp_path: Path) -> None:
+    assert run_config("fasten-plate").choice(DOMAIN).name == "bench"
+    assert run_config("fasten-plate", domain="bench").choice(DOMAIN).name == "bench"
+    with pytest.raises(InputError, match="'fasten-plate' is of the domain 'bench', not 'house"):
+        run_config("fasten-plate", domain="household")
+    shipped_file = files("forestall.domains") / "bench" / "domain.toml"
+    (tmp_path / "own.toml").write_text(shipped_file.read_text().replace('"bench"', '"own"', 1))
+    task = (files("forestall.domains") / "bench" / "tasks" / "fasten-plate.toml").read_text()
+    (tmp_path / "task.toml").write_text(task.replace('"bench"', '"own.toml"', 1))
+    assert run_config(str(tmp_path / "task.toml")).choice(DOMAIN).name == "own"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from forestall.assembly.configuration import Given, choices
+from forestall.assembly.configuration import Given, choices, same_domain
 from forestall.assembly.make import STORED_STATES
 from forestall.assembly.options import built
 from forestall.assembly.parts import Assembly
@@ -59,6 +59,8 @@ def judge_stored(
         readable = [n for n in known(STATES.name) if n != TRUTH_STATES]
         raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)
     loaded = None if task is None else load_task(task)
+    if task is not None and loaded is not None:
+        same_domain(given or Given(), task, loaded.domain.name)
     own = find(DOMAIN.name, names[DOMAIN.name])
     domain: Domain = built(own, {}, None) if loaded is None else loaded.domain
     wanted = domain.check(Subtask.parse(subtask))

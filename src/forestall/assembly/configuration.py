@@ -17,6 +17,7 @@ from typing import Any
 from forestall.assembly.options import checked, plain
 from forestall.assembly.registry import TABLES, find, table
 from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.kinds import DOMAIN
 from forestall.tasks.files import load_task
 from forestall.types.kind import Kind
 
@@ -243,12 +244,18 @@ def run_config(
     """
     said = Given.named(named).over(given or Given())
     if task:
-        said = said.over(Given.named(dict(load_task(task).domain.run)))
+        domain = load_task(task).domain
+        same_domain(said, task, domain.name)
+        said = said.over(Given.named(dict(domain.run)))
+    chosen = choices(_ablated(said, without))
+    if task:
+        own = Choice(DOMAIN.name, domain.name)
+        chosen = tuple(own if c.kind == own.kind else c for c in chosen)
     return RunConfig(
         task,
         scenario,
         seed,
-        choices(_ablated(said, without)),
+        chosen,
         without,
         keep_observations,
         final_look,
@@ -280,6 +287,16 @@ def read_file(path: Path) -> tuple[Given, dict[str, Any]]:
             known = (*TABLES, *SHORT, *RUN_KEYS)
             raise FileFormatError(f"{path}: {UnknownNameError('table', key, known)}")
     return Given.named(data), run
+
+
+def same_domain(given: Given, task: str, domain: str) -> None:
+    """A task is written in its domain's words, so no run of it can be of another."""
+    for kind, name, _ in given.parts:
+        if kind == DOMAIN.name and name not in (None, domain):
+            raise InputError(
+                f"task {task!r} is of the domain {domain!r}, not {name!r}; "
+                f"a task file names its domain with a line: domain = {name!r}"
+            )
 
 
 def _ablated(given: Given, without: str | None) -> Given:

@@ -247,7 +247,7 @@ def _validated(model: type[M], source: str, text: str) -> M:
 
 def _task(source: str, data: TaskFile, of: str) -> LoadedTask:
     try:
-        domain = _domain(data, data.domain or of)
+        domain = _domain(data, _beside(source, data.domain or of))
         goal = _goal(data.goal, domain)
         plan = domain.check_plan(Plan.parse(data.plan, data.goal.text))
         for subtask in plan:
@@ -258,6 +258,11 @@ def _task(source: str, data: TaskFile, of: str) -> LoadedTask:
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     return LoadedTask(task, domain)
+
+
+def _beside(source: str, name: str) -> str:
+    """A domain file is found from the task file that names it, wherever one works."""
+    return str(Path(source).parent / name) if name.endswith((".toml", ".pddl")) else name
 
 
 def _domain(data: TaskFile, name: str) -> Domain:
