@@ -160,4 +160,5 @@ def test_a_run_is_of_its_tasks_domain_and_says_so(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text(shipped_file.read_text().replace('"bench"', '"own"', 1))
     task = (files("forestall.domains") / "bench" / "tasks" / "fasten-plate.toml").read_text()
     (tmp_path / "task.toml").write_text(task.replace('"bench"', '"own.toml"', 1))
-    assert run_config(str(tmp_path / "task.toml")).choice(DOMAIN).name == "own"
+    for said in (None, "own"):
+        assert run_config(str(tmp_path / "task.toml"), domain=said).choice(DOMAIN).name == "own"

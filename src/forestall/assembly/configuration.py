@@ -246,7 +246,8 @@ def run_config(
     if task:
         domain = load_task(task).domain
         same_domain(said, task, domain.name)
-        said = said.over(Given.named(dict(domain.run)))
+        parts = tuple(part for part in said.parts if part[0] != DOMAIN.name)
+        said = Given(parts).over(Given.named(dict(domain.run)))
     chosen = choices(_ablated(said, without))
     if task:
         own = Choice(DOMAIN.name, domain.name)
