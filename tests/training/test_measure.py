@@ -247,7 +247,11 @@ def test_threshold_is_the_lowest_that_reaches_the_target() -> None:
     assert (forced.value, forced.reached, forced.balanced) == (0.0, False, 0.75)
 
 
-@given(st.integers(0, 2**32), st.floats(0, 1), st.integers(1, 10))
+TARGETS = st.just(0.0) | st.floats(1e-6, 1)
+"""Below the test's tolerance no accuracy can be told from a target that it misses."""
+
+
+@given(st.integers(0, 2**32), TARGETS, st.integers(1, 10))
 @settings(max_examples=40, deadline=None)
 def test_threshold_does_what_it_says(seed: int, target: float, smallest: int) -> None:
     rng = np.random.default_rng(seed)
