@@ -95,7 +95,7 @@ def _encoder() -> dict[str, Any]:
     started = time.perf_counter()
     try:
         encoder = TwoTowerEncoder()
-        encoder.encode(["an open microwave"])
+        encoder.encode(["a thing"])
         encoder.encode_image(np.zeros((48, 64, 3), dtype=np.uint8))
     except ModelFileError as error:
         return _row("image-text encoder", False, True, str(error))

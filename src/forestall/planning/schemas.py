@@ -88,7 +88,8 @@ class Schemas:
         if isinstance(formula, And | Or):
             parts = sorted(formula.parts, key=self._cost)
             several = [self._compile(p, bound) for p in parts]
-            return _both(several) if isinstance(formula, And) else _either(several)
+            join = all_of if isinstance(formula, And) else any_of
+            return lambda w, names: join(part(w, names) for part in several)
         if isinstance(formula, Some):
             solved = self._join(formula.variables, formula.part, bound)
             return lambda w, names: any_of(n for _, n in solved(w, names))
@@ -330,34 +331,6 @@ def _conjuncts(formula: Formula) -> tuple[Formula, ...]:
     if isinstance(formula, And):
         return tuple(c for p in formula.parts for c in _conjuncts(p))
     return (formula,)
-
-
-def _both(several: list[Ground]) -> Ground:
-    def ground(w: World, names: Names) -> Node:
-        found = []
-        for part in several:
-            node = part(w, names)
-            if node is False:
-                return False
-            if node is not True:
-                found.append(node)
-        return all_of(found) if found else True
-
-    return ground
-
-
-def _either(several: list[Ground]) -> Ground:
-    def ground(w: World, names: Names) -> Node:
-        found = []
-        for part in several:
-            node = part(w, names)
-            if node is True:
-                return True
-            if node is not False:
-                found.append(node)
-        return any_of(found) if found else False
-
-    return ground
 
 
 def _kind(kind: str) -> Source:
