@@ -30,6 +30,8 @@ class Hold(Enum):
 
     STOPPED = "stopped safely"  # a fact must change and no plan changes it
     ALARM = "alarm without an answer"  # unexplained, or without a plan, or repaired too often
+    SENSES = "senses not to be trusted"  # the observation cannot be what the robot sees
+    INTERNAL = "something of ours failed"  # a part raised an error or did not answer in time
     REPLAN_LIMIT = "replan limit"
     SUBTASK_LIMIT = "subtask limit"
 

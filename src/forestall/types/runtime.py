@@ -48,6 +48,8 @@ class BoundaryContext:
         replans: how many plans were made in this episode so far.
         when: at which moment this is. After the subtask `index` is still its own, at the end of the
             plan it is the plan's length and `subtask` the last one.
+        refused: ground subtasks that the robot refused, about whose arguments nothing has changed
+            since; a plan that has one of them will be refused again.
     """
 
     task: Task
@@ -63,6 +65,7 @@ class BoundaryContext:
     may_look: bool = True
     replans: int = 0
     when: When = When.BEFORE
+    refused: tuple[Subtask, ...] = ()
 
     def remaining(self) -> tuple[Subtask, ...]:
         """What is left of the plan, this subtask first (not grounded)."""
