@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
 from forestall.types.facts import Literal, Truth, category_of, is_instance
@@ -63,7 +64,7 @@ class SymbolicReasoner:
         broken = [
             v
             for v in self.violations(preconditions, graph, subtask, self.domain)
-            if v.truth is Truth.FALSE and _counts(v, subtask, graph, when, self.domain)
+            if v.truth is Truth.FALSE and counts(v, subtask, graph, when, self.domain)
         ]
         if not broken:
             count = len(context.references)
@@ -91,41 +92,6 @@ class SymbolicReasoner:
 
     def _nothing(self, cause: str) -> Diagnosis:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
-
-
-def _counts(
-    violation: Violation, subtask: Subtask, graph: SceneGraph, when: When, domain: Domain
-) -> bool:
-    """Whether a violated fact matters before a subtask, or after it."""
-    lifted = violation.precondition.literal
-    if when is When.BEFORE:
-        return _concerns(violation, domain) and not _is_the_effect(lifted, subtask, domain)
-    if _is_put(lifted, subtask, domain):
-        return not _on_another(violation.literal, graph, domain)
-    return _concerns(violation, domain)
-
-
-def _is_put(lifted: Literal, subtask: Subtask, domain: Domain) -> bool:
-    """Whether a fact says what putting something somewhere brings about."""
-    variables = tuple(domain.bound(subtask))
-    return lifted.predicate in domain.containing and lifted.args == variables
-
-
-def _on_another(literal: Literal, graph: SceneGraph, domain: Domain) -> bool:
-    """Whether a thing stands on another instance of a support of which any will do."""
-    thing, target = literal.args
-    return domain.is_open_support(target) and any(
-        category_of(parent) == category_of(target)
-        for parent in graph.parents(thing, domain.containing)
-    )
-
-
-def _is_the_effect(literal: Literal, subtask: Subtask, domain: Domain) -> bool:
-    """Whether a fact is violated only because what the subtask is to bring about holds already.
-
-    That a door was closed before it was opened is no need of opening it.
-    """
-    return literal == domain.skill(subtask.skill).undoes
 
 
 def _ids(graph: SceneGraph, name: str) -> tuple[str, ...]:
@@ -168,21 +134,6 @@ def explain(
     if literal.value == "false":
         return f"{name} is {relation}; it was not {when}"
     return f"{name} is not {relation}; it was {when}"
-
-
-def _concerns(violation: Violation, domain: Domain) -> bool:
-    """Whether a violated fact speaks of an argument, and not merely of where it happens to stand.
-
-    Which counter a thing stood on is a habit of the demonstrations and not a need.
-    """
-    lifted = violation.precondition.literal
-    if lifted.predicate in domain.containing and lifted.value == "true":
-        if not lifted.args[0].startswith("?"):
-            return lifted.args[1].startswith("?")
-        return not domain.is_a(violation.literal.args[1], domain.roles.fixture)
-    if lifted.predicate in (domain.roles.hand_empty, domain.roles.holding):
-        return True
-    return any(a.startswith("?") for a in lifted.args)
 
 
 def _rank(literal: Literal, domain: Domain) -> int:
