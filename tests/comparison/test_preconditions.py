@@ -184,14 +184,18 @@ def test_unobserved_counts_neither_for_nor_against() -> None:
     assert found["open(?target)=open"].weight == pytest.approx(2 / 3)
 
 
-def test_one_demonstration_is_not_enough() -> None:
-    assert mine(HEAT[:1], DOMAIN) == ()
+def test_one_demonstration_is_enough_and_counts_as_one() -> None:
+    found = mine(HEAT[:1], DOMAIN)
+    assert {(p.support, p.total) for p in found} == {(1, 1)}
+    assert "vacant(?target)" in {str(p.literal) for p in found}
+    context = {"on_top_of(Potato, ?object)"}  # what is no argument needs more than one
+    assert not context & {str(p.literal) for p in found}
     assert mine([], DOMAIN) == ()
 
 
 def test_two_steps_of_one_run_are_one_demonstration() -> None:
     twice = [HEAT[0], replace(HEAT[0], index=3)]
-    assert mine(twice, DOMAIN) == ()
+    assert {(p.support, p.total) for p in mine(twice, DOMAIN)} == {(1, 1)}
     found = mine([*twice, HEAT[1]], DOMAIN)
     assert {(p.support, p.total) for p in found} == {(2, 2)}
 
@@ -223,7 +227,9 @@ def test_other_skills_are_passed_over() -> None:
 
 
 def test_support_is_asked_for() -> None:
-    assert mine(HEAT[:3], DOMAIN, MiningConfig(minimum_support=4)) == ()
+    dirty = references("heat-potato", 8, put_plate(plate="dirty=dirty"), put_plate())
+    shown = {str(p.literal) for p in mine(dirty, DOMAIN, MiningConfig(minimum_support=4))}
+    assert "vacant(?target)" in shown and "dirty(?object)=clean" not in shown
     with pytest.raises(InputError):
         MiningConfig(minimum_support=0)
     one = MiningConfig(minimum_support=1, contextual_support=1)

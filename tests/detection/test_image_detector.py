@@ -59,7 +59,7 @@ def test_without_a_picture_nothing_is_judged(view: View | None) -> None:
         graph("Mug-1"), observation(RED), [reference("d", view), kept]
     )
     assert verdict.nearest is kept
-    assert verdict.note == "compared with 1 of 2 references"
+    assert verdict.note == "compared with 1 of 2 demonstrations"
 
 
 def test_no_reference() -> None:

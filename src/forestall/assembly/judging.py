@@ -20,6 +20,7 @@ from forestall.comparison.score import BatchScorer
 from forestall.detection.caption import CaptionDetector
 from forestall.detection.image import ImageDetector
 from forestall.detection.objects import ObjectCountDetector
+from forestall.detection.preconditions import PreconditionConfig, PreconditionDetector
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.none import NoReasoning
 from forestall.diagnosis.symbolic import SymbolicReasoner
@@ -121,6 +122,16 @@ def objects(parts: Parts, *, alarm: DetectorConfig | None = None) -> ObjectCount
 def image(parts: Parts, *, alarm: DetectorConfig | None = None) -> ImageDetector:
     """Likeness of whole pictures."""
     return ImageDetector(parts.part(IMAGE_ENCODER), alarm)
+
+
+def always_held(
+    parts: Parts,
+    *,
+    alarm: PreconditionConfig | None = None,
+    mining: MiningConfig | None = None,
+) -> PreconditionDetector:
+    """What always held before the subtask in its demonstrations."""
+    return PreconditionDetector(parts.domain, mining, alarm)
 
 
 def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDetector:

@@ -108,6 +108,7 @@ TABLES: Mapping[str, Table] = {
                 "caption": f"{_JUDGING}:caption",
                 "image": f"{_JUDGING}:image",
                 "objects": f"{_JUDGING}:objects",
+                "preconditions": f"{_JUDGING}:always_held",
                 "scene-graph": f"{_JUDGING}:scene_graph",
             },
         ),

@@ -1,4 +1,4 @@
-"""Facts about a subtask's arguments as literals over ?object and ?target.
+"""Facts about a subtask's arguments as literals over the skill's parameters.
 
 Called by preconditions; calls nothing. A literal is true, false, or unobserved in a graph; `lift`
 collects the true ones, the negative ones included.
@@ -7,6 +7,7 @@ collects the true ones, the negative ones included.
 from __future__ import annotations
 
 from enum import Enum
+from itertools import permutations
 
 from forestall.domain.formula import literals
 from forestall.domain.model import Domain
@@ -33,7 +34,8 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
     - vacant(?x) for receptacles with a capacity and for vessels;
     - accessible(?x) for what can be picked up; unblocked(?x) for what of it the skill needs clear;
     - held_by(?x, gripper), hand_empty(), and held_by(Lettuce, gripper) for what is no argument;
-    - inside(?object, ?target) and on_top_of(?object, ?target), or their negations;
+    - the relations between two arguments that skills are about: inside(?object, ?target) or not;
+    - every other derived fact about one argument, or about none, that the domain wants mined;
     - contents by category, but not of supports, on which many things merely stand.
 
     An argument that is a category name and no node of the graph has no true literal.
@@ -59,17 +61,38 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
             candidates |= _about_movable(variable, skill, domain)
         if not domain.is_open_support(category.name) and domain.offers(category.name):
             candidates |= _contents(graph, node.id, variable, roles, domain)
-    if len(roles) == 2:
-        first, second = roles
-        for predicate in domain.containing:
-            for value in ("true", "false"):
-                candidates.add(Literal(predicate, (first, second), value))
+    candidates |= _between(tuple(roles), domain) | _derived(tuple(roles), domain)
     held = graph.holding
     if held is not None and known.holding and held not in roles.values():
         node = graph.get(held)
         category_name = category_of(held) if node is None else node.category
         candidates.add(Literal(known.holding, (category_name, GRIPPER)))
     return frozenset(c for c in candidates if evaluate(c, graph, subtask, domain) is Truth.TRUE)
+
+
+def _between(variables: tuple[str, ...], domain: Domain) -> set[Literal]:
+    """Relations that skills are about, between arguments; denied in the order of the parameters."""
+    apart = (domain.roles.holding, domain.roles.blocking)
+    predicates = {*domain.containing, *(p for p in domain.relations if p in domain.moved)}
+    return {
+        Literal(predicate, pair, value)
+        for predicate in predicates.difference(apart)
+        for pair in permutations(variables, 2)
+        for value in ("true", "false")
+        if value == "true" or variables.index(pair[0]) < variables.index(pair[1])
+    }
+
+
+def _derived(variables: tuple[str, ...], domain: Domain) -> set[Literal]:
+    """Derived facts beyond those that the engine knows by their part."""
+    roles = domain.roles
+    apart = (roles.vacant, roles.accessible, roles.unblocked, roles.hand_empty, roles.shut)
+    found = set()
+    for predicate in domain.derived.values():
+        if predicate.mined and predicate.name not in apart:
+            for args in permutations(variables, len(predicate.parameters)):
+                found |= {Literal(predicate.name, args, v) for v in ("true", "false")}
+    return found
 
 
 def _about_movable(variable: str, skill: Skill, domain: Domain) -> set[Literal]:

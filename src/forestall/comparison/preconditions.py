@@ -25,7 +25,8 @@ class MiningConfig:
     """How much evidence a precondition needs.
 
     Args:
-        minimum_support: demonstrations in which the literal must have held.
+        minimum_support: demonstrations in which the literal must have held; all of them, where
+            there are fewer. One is enough to raise an alarm, whose cause says that it is one.
         contextual_support: the same for a literal about what is not an argument of the subtask.
     """
 
@@ -73,7 +74,7 @@ def mine(
     skill = [r for r in references if domain.family(r.subtask) == domain.family(subtask)]
     kinds = _kinds(subtask, domain)
     same = [r for r in skill if _kinds(r.subtask, domain) == kinds]
-    alike = len(_runs(same)) >= config.minimum_support
+    alike = len(_runs(same)) >= min(config.minimum_support, len(_runs(skill)))
     group = same if alike else skill
     step = next((r.index for r in group if r.task == task), None)
     candidates: set[Literal] = set()
@@ -90,8 +91,10 @@ def mine(
             continue
         true = [r for t, r in zip(truths, asked, strict=True) if t is Truth.TRUE]
         counted = [r for r in true if kind is not Kind.CONTEXT or r.index == step]
-        needed = config.contextual_support if kind is Kind.CONTEXT else config.minimum_support
-        if len(_runs(counted)) >= needed:
+        needed = min(config.minimum_support, len(_runs(asked)))
+        if kind is Kind.CONTEXT:
+            needed = config.contextual_support
+        if true and len(_runs(counted)) >= needed:
             support, total = len(_runs(true)), len(_runs(asked))
             found.append(Precondition(subtask.skill, literal, support, total, support / total))
     return tuple(sorted(found, key=lambda p: (-p.weight, p.literal)))

@@ -12,7 +12,13 @@ from collections.abc import Sequence
 
 from forestall.detection.scene_graph import DetectorConfig
 from forestall.errors import InputError
-from forestall.types.verdict import Calibration, Decision, Reference, Verdict
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Reference,
+    Verdict,
+    demonstrations_of,
+)
 
 NOTHING_TO_COMPARE = "nothing to compare with: {}"
 
@@ -30,7 +36,7 @@ def judged(
         detector: its name.
         config: the threshold.
         scores: each reference that could be compared, with its score.
-        references: how many references there were.
+        references: how many demonstrations the references come from.
         nothing: why there are no scores, where there are none.
     """
     if not scores:
@@ -45,6 +51,7 @@ def judged(
         )
     score, nearest = max(scores, key=lambda s: s[0])
     fits = score >= config.threshold
+    compared = demonstrations_of([r for _, r in scores])
     return Verdict(
         Decision.PROCEED if fits else Decision.REPLAN,
         detector,
@@ -53,7 +60,7 @@ def judged(
         config.calibration,
         nearest=nearest,
         references=references,
-        note=f"compared with {len(scores)} of {references} references",
+        note=f"compared with {compared} of {references} demonstrations",
     )
 
 

@@ -14,7 +14,7 @@ from forestall.embeddings.views import caption_rows
 from forestall.seams import Captioner, TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict
+from forestall.types.verdict import Reference, Verdict, demonstrations_of
 
 
 class CaptionDetector:
@@ -45,7 +45,9 @@ class CaptionDetector:
             InputError: a reference's caption comes from another captioner.
         """
         if observation is None:
-            return judged(self.name, self._config, (), len(references), "no picture was given")
+            return judged(
+                self.name, self._config, (), demonstrations_of(references), "no picture was given"
+            )
         kept = []
         for r in references:
             if r.view is not None and r.view.captioner:
@@ -61,4 +63,4 @@ class CaptionDetector:
                 if rows[0].any() or row.any()
             ]
         nothing = "nothing is said of either side" if kept else "no reference keeps a caption"
-        return judged(self.name, self._config, scores, len(references), nothing)
+        return judged(self.name, self._config, scores, demonstrations_of(references), nothing)

@@ -15,7 +15,7 @@ from forestall.seams import ImageEncoder
 from forestall.types.feature import unquantised
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict
+from forestall.types.verdict import Reference, Verdict, demonstrations_of
 
 
 class ImageDetector:
@@ -40,7 +40,9 @@ class ImageDetector:
             InputError: a reference's feature comes from another encoder.
         """
         if observation is None:
-            return judged(self.name, self._config, (), len(references), "no picture was given")
+            return judged(
+                self.name, self._config, (), demonstrations_of(references), "no picture was given"
+            )
         kept = []
         for r in references:
             if r.view is not None and r.view.image is not None:
@@ -57,5 +59,9 @@ class ImageDetector:
                     )
                 scores.append((round(float(mine @ row), 6), r))
         return judged(
-            self.name, self._config, scores, len(references), "no reference keeps its picture"
+            self.name,
+            self._config,
+            scores,
+            demonstrations_of(references),
+            "no reference keeps its picture",
         )

@@ -14,7 +14,7 @@ from forestall.domain.model import Domain
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict
+from forestall.types.verdict import Reference, Verdict, demonstrations_of
 
 
 class ObjectCountDetector:
@@ -45,7 +45,7 @@ class ObjectCountDetector:
         pairs = [(overlap(mine, counts(r.graph, self._supports)), r) for r in references]
         scores = [(round(score, 6), r) for score, r in pairs if score is not None]
         nothing = "neither the scene nor a reference has a located object"
-        return judged(self.name, self._config, scores, len(references), nothing)
+        return judged(self.name, self._config, scores, demonstrations_of(references), nothing)
 
 
 def counts(graph: SceneGraph, supports: Iterable[str]) -> Counter[str]:

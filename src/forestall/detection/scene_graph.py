@@ -12,7 +12,13 @@ from forestall.errors import InputError
 from forestall.seams import GraphScorer
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import Observation
-from forestall.types.verdict import Calibration, Decision, Reference, Verdict
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Reference,
+    Verdict,
+    demonstrations_of,
+)
 
 NO_REFERENCE = "no reference above the floor: nothing to compare with, so nothing was judged"
 NOT_COMPARABLE = "no reference had found {} at this point, so nothing was judged"
@@ -80,7 +86,7 @@ class SceneGraphDetector:
                 None,
                 config.threshold,
                 Calibration.UNCALIBRATED,
-                references=len(references),
+                references=demonstrations_of(references),
                 note=NOT_COMPARABLE.format(", ".join(unknown)) if references else NO_REFERENCE,
             )
         verdict = replace(
@@ -88,6 +94,7 @@ class SceneGraphDetector:
             detector=self.name,
             threshold=config.threshold,
             calibration=config.calibration,
+            references=demonstrations_of(able),
         )
         if best.score >= config.threshold:
             return replace(verdict, decision=Decision.PROCEED)

@@ -17,7 +17,17 @@ from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext, When
-from forestall.types.verdict import Diagnosis, Precondition, Reference, Verdict, Violation
+from forestall.types.verdict import (
+    Diagnosis,
+    Precondition,
+    Reference,
+    Verdict,
+    Violation,
+    demonstrations_of,
+)
+
+_TOLD = 3
+"""How many differences a sentence names."""
 
 
 class Miner(Protocol):
@@ -67,10 +77,10 @@ class SymbolicReasoner:
             if v.truth is Truth.FALSE and counts(v, subtask, graph, when, self.domain)
         ]
         if not broken:
-            count = len(context.references)
+            count = demonstrations_of(context.references)
             return self._nothing(
-                f"nothing that held {when.value} {subtask.skill} in the {count} retrieved "
-                f"demonstration{'s' if count != 1 else ''} is violated"
+                f"nothing is violated that held {when.value} {subtask.skill} "
+                f"{in_demonstrations(count, count)}{_difference(verdict)}"
             )
         domain = self.domain
         broken.sort(key=lambda v: (-v.precondition.weight, _rank(v.literal, domain), v.literal))
@@ -94,6 +104,15 @@ class SymbolicReasoner:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
 
 
+def _difference(verdict: Verdict) -> str:
+    """What differs from the nearest demonstration, where no cause is known."""
+    texts = [d.text for d in verdict.discrepancies]
+    if not texts:
+        return ""
+    more = f"; and {len(texts) - _TOLD} more" if len(texts) > _TOLD else ""
+    return f"; what differs from the nearest one: {'; '.join(texts[:_TOLD])}{more}"
+
+
 def _ids(graph: SceneGraph, name: str) -> tuple[str, ...]:
     """Node ids of a name; an instance that has gone out of the graph keeps its name."""
     return graph.matches(name) or ((name,) if is_instance(name) else ())
@@ -108,8 +127,7 @@ def explain(
 ) -> str:
     """One sentence: what is the case, and what it was in the demonstrations."""
     literal, p, roles = violation.literal, violation.precondition, domain.roles
-    many = f"all {p.total}" if p.support == p.total else f"{p.support} of {p.total}"
-    when = f"in {many} demonstration{'s' if p.total != 1 else ''}"
+    when = in_demonstrations(p.support, p.total)
     name = literal.args[0] if literal.args else ""
     predicate, yes = literal.predicate, literal.value == "true"
     if predicate == roles.vacant and yes:
@@ -134,6 +152,14 @@ def explain(
     if literal.value == "false":
         return f"{name} is {relation}; it was not {when}"
     return f"{name} is not {relation}; it was {when}"
+
+
+def in_demonstrations(support: int, total: int) -> str:
+    """In how many demonstrations something held; thin evidence is called so."""
+    if total == 1:
+        return "in the only demonstration there is"
+    many = f"all {total}" if support == total else f"{support} of {total}"
+    return f"in {many} demonstrations"
 
 
 def _rank(literal: Literal, domain: Domain) -> int:

@@ -26,7 +26,8 @@ class RetrievalConfig:
     """Which stored steps count as references.
 
     Args:
-        k: how many references at most.
+        k: how many references at most; None: every step above the floor, so that among many equal
+            texts the scene decides and no demonstration is stored in vain.
         floor: smallest similarity of the subtask texts. With hashed words the ten tasks' subtasks
             score 1.0 for the same words, 0.87 at most for other things handled alike, 0.55 to
             0.75 for the same skill on another object. A scene without the object at hand cannot
@@ -37,14 +38,14 @@ class RetrievalConfig:
         same_skill: whether only steps of the same skill count (those of one family are one).
     """
 
-    k: int = 8
+    k: int | None = None
     floor: float = 0.9
     per_demonstration: int = 2
     same_task_bonus: float = 0.05
     same_skill: bool = True
 
     def __post_init__(self) -> None:
-        if self.k < 1 or self.per_demonstration < 1:
+        if (self.k is not None and self.k < 1) or self.per_demonstration < 1:
             raise InputError("k and per_demonstration are at least 1")
 
 

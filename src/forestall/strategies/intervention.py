@@ -127,9 +127,8 @@ class Intervention:
         """Replan for what must change; `context.index` is where the plan at hand would go on."""
         if not diagnosis.must_change:
             replan = Replan(ReplanOutcome.NOTHING_TO_CHANGE, producer=self._replanner.name)
-            return StrategyAnswer(
-                Decision.PROCEED, verdict, diagnosis, replan, "nothing must change", clock.items()
-            )
+            why = f"no cause was found: {diagnosis.cause}"
+            return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, replan, why, clock.items())
         key = tuple(sorted(diagnosis.must_change))
         if self._attempts.get(key, 0) >= self._max_attempts:
             why = f"tried {self._max_attempts} repairs of this already"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -41,6 +42,11 @@ class Reference:
     later: tuple[Subtask, ...] = ()  # what the demonstration did afterwards, this step first
     view: View | None = None  # the picture as a whole, where it was kept
     after: SceneGraph | None = None  # everything that was known after the step, if anybody looked
+
+
+def demonstrations_of(references: Sequence[Reference]) -> int:
+    """How many demonstrations some references come from; one may have several fitting steps."""
+    return len({r.demonstration for r in references})
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +117,7 @@ class Verdict:
     nearest: Reference | None = None
     matches: tuple[tuple[str, str], ...] = ()  # (observed id, expected id in the nearest)
     discrepancies: tuple[Discrepancy, ...] = ()
-    references: int = 0
+    references: int = 0  # demonstrations that there was something to compare with of
     note: str = ""
 
     @property

@@ -1,0 +1,154 @@
+"""Judging by what always held: the heaviest mined precondition that a scene violates.
+
+Called like every detector at a boundary; calls the mining of the comparison. It needs no score:
+clutter that no demonstration had changes nothing, and one decisive fact is not diluted by a scene
+that is otherwise alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from forestall.comparison.preconditions import MiningConfig, mine, violations
+from forestall.comparison.relevance import counts
+from forestall.detection.scene_graph import NO_REFERENCE
+from forestall.domain.model import Domain
+from forestall.errors import InputError
+from forestall.types.facts import Truth
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+from forestall.types.plan import Subtask
+from forestall.types.runtime import When
+from forestall.types.verdict import (
+    Calibration,
+    Decision,
+    Precondition,
+    Reference,
+    Verdict,
+    Violation,
+    demonstrations_of,
+)
+
+_KEPT = 256
+"""How many sets of mined preconditions are remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class PreconditionConfig:
+    """When a violated precondition is an alarm.
+
+    Args:
+        threshold: alarm where the score, 1 minus the weight of the heaviest violated precondition,
+            is below. The weight is the rule of succession over its support, (s + 1) / (n + 2): one
+            demonstration weighs 0.67, twelve weigh 0.93. With 0.5 every violation is an alarm; a
+            lower one asks for more demonstrations than one.
+        calibration: where the threshold comes from.
+
+    Raises:
+        InputError: a threshold that is not between 0 and 1.
+    """
+
+    threshold: float = 0.5
+    calibration: Calibration = Calibration.FIXED
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.threshold <= 1:
+            raise InputError(f"threshold {self.threshold} is not between 0 and 1")
+
+
+class PreconditionDetector:
+    """Judges by mined preconditions (implements `Detector`).
+
+    - a precondition is violated whose weight the threshold asks for: replan;
+    - none is, but one could not be observed: look again, because what was not seen is neither;
+    - all hold: proceed;
+    - nothing was mined: proceed without a score and with a note; nothing was judged.
+
+    Args:
+        domain: what facts there are about arguments.
+        mining: how much evidence a precondition needs.
+        config: the threshold.
+    """
+
+    name = "preconditions"
+
+    def __init__(
+        self,
+        domain: Domain,
+        mining: MiningConfig | None = None,
+        config: PreconditionConfig | None = None,
+    ) -> None:
+        self._domain = domain
+        self._mining = mining or MiningConfig()
+        self._config = config or PreconditionConfig()
+        self._mined: dict[object, tuple[Precondition, ...]] = {}
+
+    def judge(
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
+    ) -> Verdict:
+        """See which mined preconditions hold on the scoped graph of a boundary."""
+        subtask = observed.subtask
+        if subtask is None or not references:
+            return self._verdict(Decision.PROCEED, None, references, NO_REFERENCE)
+        mined = self._preconditions(references, subtask)
+        if not mined:
+            note = f"nothing always held before {subtask.skill}, so nothing was judged"
+            return self._verdict(Decision.PROCEED, None, references, note)
+        found = [
+            v
+            for v in violations(mined, observed, subtask, self._domain)
+            if counts(v, subtask, observed, When.BEFORE, self._domain)
+        ]
+        false = [v for v in found if v.truth is Truth.FALSE]
+        score = 1.0 - max((weight(v) for v in false), default=0.0)
+        if score < self._config.threshold:
+            return self._verdict(Decision.REPLAN, score, references, _listed("violated", false))
+        unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
+        if unseen:
+            note = _listed("not observed", unseen)
+            return self._verdict(Decision.LOOK_AGAIN, score, references, note)
+        return self._verdict(Decision.PROCEED, score, references)
+
+    def _preconditions(
+        self, references: Sequence[Reference], subtask: Subtask
+    ) -> tuple[Precondition, ...]:
+        """What always held; mined once for the same references and the same kinds of arguments."""
+        key = (subtask, references[0].task, tuple((r.demonstration, r.index) for r in references))
+        if key not in self._mined:
+            if len(self._mined) >= _KEPT:
+                self._mined.clear()
+            self._mined[key] = mine(references, self._domain, self._mining, subtask=subtask)
+        return self._mined[key]
+
+    def _verdict(
+        self,
+        decision: Decision,
+        score: float | None,
+        references: Sequence[Reference],
+        note: str = "",
+    ) -> Verdict:
+        config = self._config
+        return Verdict(
+            decision,
+            self.name,
+            score,
+            config.threshold,
+            Calibration.UNCALIBRATED if score is None else config.calibration,
+            nearest=references[0] if references else None,
+            references=demonstrations_of(references),
+            note=note,
+        )
+
+
+def weight(violation: Violation) -> float:
+    """How much a precondition weighs by its evidence: the rule of succession."""
+    p = violation.precondition
+    return (p.support + 1) / (p.total + 2)
+
+
+def _listed(what: str, found: Sequence[Violation]) -> str:
+    texts = [
+        f"{v.literal} (held in {v.precondition.support} of {v.precondition.total})" for v in found
+    ]
+    return f"{what}: {', '.join(texts)}"

@@ -1,0 +1,104 @@
+"""Judging by what always held: in the household's words and in a small domain of the test's own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from forestall.comparison.preconditions import MiningConfig
+from forestall.detection.preconditions import PreconditionConfig, PreconditionDetector
+from forestall.domain.load import shipped
+from forestall.errors import InputError
+from forestall.types.graph import ObjectNode, Relation, SceneGraph
+from forestall.types.plan import Subtask
+from forestall.types.verdict import Calibration, Decision, Reference
+
+BENCH = shipped("bench")
+INSERT = Subtask.parse("insert(RoundPeg-1, RoundHole-1)")
+
+
+def scene(
+    *more: Relation, dirty: str | None = "clean", clutter: int = 0, held: bool = True
+) -> SceneGraph:
+    nodes = [
+        ObjectNode("gripper", "gripper"),
+        ObjectNode("RoundPeg-1", "RoundPeg", (("dirt", "clean"),)),
+        ObjectNode("RoundHole-1", "RoundHole", (("dirt", dirty),)),
+        *(ObjectNode(f"Nut-{i}", "Nut") for i in range(1, clutter + 2)),
+    ]
+    grip = (Relation("RoundPeg-1", BENCH.roles.holding or "", "gripper"),) if held else ()
+    return SceneGraph(tuple(nodes), (*grip, *more), INSERT)
+
+
+def references(*graphs: SceneGraph) -> list[Reference]:
+    return [Reference(f"d{i}", "t", 3, INSERT, 1.0, g) for i, g in enumerate(graphs)]
+
+
+FOUR = references(*[scene() for _ in range(4)])
+IN_THE_HOLE = Relation("Nut-1", "seated_in", "RoundHole-1")
+
+
+def test_what_always_held_holds() -> None:
+    verdict = PreconditionDetector(BENCH).judge(scene(), None, FOUR)
+    assert (verdict.decision, verdict.score, verdict.references) == (Decision.PROCEED, 1.0, 4)
+    assert verdict.judged
+
+
+def test_clutter_that_no_demonstration_had_changes_nothing() -> None:
+    verdict = PreconditionDetector(BENCH).judge(scene(clutter=20), None, FOUR)
+    assert (verdict.decision, verdict.score) == (Decision.PROCEED, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("observed", "named"),
+    [
+        (scene(IN_THE_HOLE), "free(RoundHole-1)"),
+        (scene(dirty="dirty"), "dirt(RoundHole-1)=clean"),
+        (scene(held=False), "gripped_by(RoundPeg-1, gripper)"),
+    ],
+)
+def test_one_decisive_fact_is_an_alarm(observed: SceneGraph, named: str) -> None:
+    verdict = PreconditionDetector(BENCH).judge(observed, None, FOUR)
+    assert verdict.decision is Decision.REPLAN
+    assert verdict.score == pytest.approx(1 - 5 / 6)
+    assert named in verdict.note and "4 of 4" in verdict.note
+
+
+def test_what_was_not_seen_calls_for_another_look() -> None:
+    verdict = PreconditionDetector(BENCH).judge(scene(dirty=None), None, FOUR)
+    assert verdict.decision is Decision.LOOK_AGAIN
+    assert verdict.note == "not observed: dirt(RoundHole-1)=clean (held in 4 of 4)"
+
+
+def test_one_demonstration_raises_an_alarm_that_says_so() -> None:
+    verdict = PreconditionDetector(BENCH).judge(scene(IN_THE_HOLE), None, FOUR[:1])
+    assert verdict.decision is Decision.REPLAN
+    assert verdict.score == pytest.approx(1 / 3)
+    assert "1 of 1" in verdict.note
+    careful = PreconditionDetector(BENCH, config=PreconditionConfig(threshold=0.25))
+    assert careful.judge(scene(IN_THE_HOLE), None, FOUR[:1]).decision is Decision.PROCEED
+    assert careful.judge(scene(IN_THE_HOLE), None, FOUR).decision is Decision.REPLAN
+
+
+def test_a_fact_that_varied_is_no_precondition() -> None:
+    varied = references(scene(), scene(dirty="dirty"), scene(), scene())
+    assert PreconditionDetector(BENCH).judge(scene(dirty="dirty"), None, varied).score == 1.0
+
+
+def test_without_a_reference_nothing_is_judged() -> None:
+    verdict = PreconditionDetector(BENCH).judge(scene(), None, [])
+    assert not verdict.judged and verdict.calibration is Calibration.UNCALIBRATED
+    no_subtask = replace(scene(), subtask=None)
+    assert not PreconditionDetector(BENCH).judge(no_subtask, None, FOUR).judged
+
+
+def test_where_nothing_always_held_nothing_is_judged() -> None:
+    empty = references(SceneGraph((), (), INSERT), SceneGraph((), (), INSERT))
+    verdict = PreconditionDetector(BENCH, MiningConfig()).judge(scene(), None, empty)
+    assert not verdict.judged or verdict.decision is not Decision.PROCEED
+
+
+def test_a_threshold_is_a_share() -> None:
+    with pytest.raises(InputError, match="threshold 2"):
+        PreconditionConfig(threshold=2)
