@@ -1,0 +1,1 @@
+"""A domain learnt from demonstrations alone: what they use, what held, what changed."""

@@ -1,0 +1,327 @@
+"""What demonstrations speak about: categories, attributes, relations, and what of it is a place.
+
+Called by `learn`; calls `traces`. Nothing here knows what a word means: a relation says where a
+thing is if a thing has it to one other thing at most, never both ways round, and skills change it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from forestall.domain.formula import And, Not, Or, Parameter, Some
+from forestall.domain.schema import Category, Predicate, PredicateKind
+from forestall.learning.traces import Trace, graphs_of, hands_of
+from forestall.types.facts import Literal
+from forestall.types.graph import ObjectNode, Relation, SceneGraph
+from forestall.types.plan import Subtask
+
+FIXED = "fixed"
+HELD = "graspable"
+TAKES = "takes_"
+TAKER = "takes_things"
+OTHER = "other"
+PLACE = "place"
+
+
+@dataclass(frozen=True, slots=True)
+class Lack:
+    """A derived fact about one thing: nothing is related to it, in some relations.
+
+    Args:
+        name: of the derived predicate.
+        relations: that nothing may have to it.
+        position: of the thing in them, 0 or 1.
+        of: categories that it is said of; None: all.
+    """
+
+    name: str
+    relations: tuple[str, ...]
+    position: int
+    of: frozenset[str] | None = None
+
+    def holds(self, graph: SceneGraph, node: ObjectNode) -> bool:
+        """Whether it is true of a node."""
+        if self.of is not None and node.category not in self.of:
+            return False
+        return not any(
+            node.id == (r.subject, r.object)[self.position]
+            for r in graph.relations
+            if r.predicate in self.relations
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """The words of some demonstrations.
+
+    Args:
+        hands: node ids of hands.
+        holding: the relation of a thing to the hand that has it, None where none was ever seen.
+        containing: relations that say where a thing is.
+        relations: all of them, sorted.
+        values: attribute → its values, the most frequent first.
+        attributes: category → its attributes.
+        lacks: derived facts, that nothing is related to a thing.
+        vacant: which of them says that nothing is in or on it, None where nothing has a place.
+        hand_empty: the derived fact that a hand is free, None where nothing was ever held.
+        exclusive: whether nothing was ever in two places at once, a hand being one.
+        takers: relation → categories that took things in it.
+        moved: categories of what was ever seen to change its place.
+    """
+
+    hands: tuple[str, ...]
+    holding: str | None
+    containing: tuple[str, ...]
+    relations: tuple[str, ...]
+    values: dict[str, tuple[str, ...]]
+    attributes: dict[str, tuple[str, ...]]
+    lacks: tuple[Lack, ...]
+    vacant: str | None
+    hand_empty: str | None
+    exclusive: bool
+    takers: dict[str, frozenset[str]]
+    moved: frozenset[str]
+
+    def lifted(
+        self, graph: SceneGraph, subtask: Subtask, variables: Sequence[str]
+    ) -> frozenset[Literal]:
+        """What is true of a subtask's arguments in a graph, over the skill's variables.
+
+        States of the arguments, relations between two of them or of one to a hand, of each what
+        nothing is related to, and whether a hand is free. The world of a graph is closed as far as
+        its nodes go: a relation that it does not have does not hold.
+        """
+        nodes = {
+            a: (v, n)
+            for a, v in zip(subtask.args, variables, strict=True)
+            if (n := graph.get(a)) is not None
+        }
+        ends = {**{h: h for h in self.hands}, **{a: v for a, (v, _) in nodes.items()}}
+        found: set[Literal] = set()
+        for variable, node in nodes.values():
+            found |= {Literal(a, (variable,), v) for a, v in node.states if v is not None}
+            found |= {Literal(x.name, (variable,)) for x in self.lacks if x.holds(graph, node)}
+        for r in graph.relations:
+            if r.subject in nodes and r.object in ends:
+                found.add(Literal(r.predicate, (ends[r.subject], ends[r.object])))
+        full = {r.object for r in graph.relations if r.predicate == self.holding}
+        if self.hand_empty is not None and not full.issuperset(self.hands):
+            found.add(Literal(self.hand_empty, ()))
+        return frozenset(found)
+
+    def predicates(self) -> dict[str, Predicate]:
+        """Relations, attributes and derived facts as schemas."""
+        group = PLACE if self.exclusive else None
+        found: dict[str, Predicate] = {}
+        for name in self.relations:
+            contains = name in self.containing
+            placing = contains or name == self.holding
+            found[name] = Predicate(
+                name,
+                PredicateKind.RELATION,
+                (Parameter("?thing"), Parameter("?other")),
+                contains=contains,
+                group=group if placing else None,
+                offered_by=TAKES + name if contains else "",
+                words=f"{{0}} {_spoken(name)} {{1}}",
+                opposite=f"{{0}} not {_spoken(name)} {{1}}",
+            )
+        for name, values in self.values.items():
+            parameters = (Parameter("?thing", f"has_{name}"),)
+            several = values if len(values) > 1 else (*values, OTHER)
+            found[name] = Predicate(
+                name, PredicateKind.ATTRIBUTE, parameters, several, material=False
+            )
+        for lack in self.lacks:
+            found[lack.name] = _derived(lack, lack.name == self.vacant)
+        if self.hand_empty is not None and self.holding is not None:
+            held = Parameter("?thing")
+            free = [Not(Some((held,), Literal(self.holding, (held.name, h)))) for h in self.hands]
+            found[self.hand_empty] = Predicate(
+                self.hand_empty,
+                PredicateKind.DERIVED,
+                definition=free[0] if len(free) == 1 else Or(tuple(free)),
+                words="a hand is free",
+                opposite="no hand is free",
+            )
+        return found
+
+    def categories(self, names: Iterable[str]) -> dict[str, Category]:
+        """Every category with what its things were seen to be."""
+        return {
+            name: Category(
+                name,
+                frozenset(
+                    (
+                        HELD if name in self.moved else FIXED,
+                        *(TAKES + r for r, who in self.takers.items() if name in who),
+                        *((TAKER,) if name in self.taking else ()),
+                    )
+                ),
+                self.attributes.get(name, ()),
+            )
+            for name in sorted(names)
+        }
+
+    def tags(self) -> tuple[str, ...]:
+        """Every tag."""
+        return (FIXED, HELD, TAKER, *(TAKES + r for r in self.containing))
+
+    @property
+    def taking(self) -> frozenset[str]:
+        """Categories in or on which something was ever seen."""
+        return frozenset(c for who in self.takers.values() for c in who)
+
+
+def vocabulary(found: Sequence[Trace], hands: Sequence[str] | None = None) -> Vocabulary:
+    """The words of some demonstrated steps.
+
+    Args:
+        found: the steps.
+        hands: node ids of hands; those that are called grippers by default.
+    """
+    graphs = graphs_of(found)
+    known = hands_of(graphs) if hands is None else tuple(hands)
+    used = Counter(r.predicate for g in graphs for r in g.relations)
+    held = Counter(r.predicate for g in graphs for r in g.relations if r.object in known)
+    holding = held.most_common(1)[0][0] if held else None
+    changed = _changed(found)
+    others = sorted(p for p in used if p != holding)
+    containing = tuple(
+        p for p in others if p in changed and _functional(graphs, p) and _one_way(graphs, p)
+    )
+    taken = {p: _ends(graphs, p, 1) for p in containing}
+    places = (*containing, *((holding,) if holding else ()))
+    moving = {changed[p] for p in places if p in changed}
+    takers = frozenset(c for who in taken.values() for c in who)
+    names = set(used)
+    lacks = _lacks(others, containing, takers, names)
+    return Vocabulary(
+        hands=known,
+        holding=holding,
+        containing=containing,
+        relations=tuple(sorted(used)),
+        values=_values(graphs),
+        attributes=_attributes(graphs),
+        lacks=lacks,
+        vacant=lacks[0].name if containing else None,
+        hand_empty=_free("hand_empty", names) if holding and known else None,
+        exclusive=bool(places) and _exclusive(graphs, places),
+        takers=taken,
+        moved=frozenset(x for names in moving for x in names),
+    )
+
+
+def _lacks(
+    others: Sequence[str], containing: tuple[str, ...], takers: frozenset[str], taken: set[str]
+) -> tuple[Lack, ...]:
+    """Whether nothing is in or on a thing; and of each other relation, whether nothing has it."""
+    found = [Lack(_free("vacant", taken), containing, 1, takers)] if containing else []
+    for name in others:
+        if name not in containing:
+            found.append(Lack(_free(f"nothing_{name}", taken), (name,), 1))
+            found.append(Lack(_free(f"{name}_nothing", taken), (name,), 0))
+    return tuple(found)
+
+
+def _free(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _derived(lack: Lack, vacant: bool) -> Predicate:
+    own, other = Parameter("?thing"), Parameter("?other")
+    ends = (own.name, other.name) if lack.position == 0 else (other.name, own.name)
+    related = tuple(Not(Some((other,), Literal(r, ends))) for r in lack.relations)
+    spoken = _spoken(lack.relations[0])
+    thing = (f"{{0}} {spoken} ", "") if lack.position == 0 else ("", f" {spoken} {{0}}")
+    return Predicate(
+        lack.name,
+        PredicateKind.DERIVED,
+        (own,),
+        definition=related[0] if len(related) == 1 else And(related),
+        words="{0} is empty" if vacant else f"{thing[0]}nothing{thing[1]}",
+        opposite="{0} is not empty" if vacant else f"{thing[0]}something{thing[1]}",
+    )
+
+
+def _spoken(predicate: str) -> str:
+    return predicate.replace("_", " ")
+
+
+def _changed(found: Iterable[Trace]) -> dict[str, frozenset[str]]:
+    """Relation → the categories of the things that began or ceased to have it."""
+    changed: dict[str, set[str]] = {}
+    for t in found:
+        if t.after is None:
+            continue
+        for r in set(t.before.relations) ^ set(t.after.relations):
+            node = t.before.get(r.subject) or t.after.get(r.subject)
+            if node is not None:
+                changed.setdefault(r.predicate, set()).add(node.category)
+    return {p: frozenset(c) for p, c in changed.items()}
+
+
+def _of(graph: SceneGraph, predicate: str) -> list[Relation]:
+    return [r for r in graph.relations if r.predicate == predicate]
+
+
+def _functional(graphs: Iterable[SceneGraph], predicate: str) -> bool:
+    """Whether every thing has the relation to one other at most."""
+    return all(
+        max(Counter(r.subject for r in _of(g, predicate)).values(), default=0) <= 1 for g in graphs
+    )
+
+
+def _one_way(graphs: Iterable[SceneGraph], predicate: str) -> bool:
+    return not any(
+        Relation(r.object, predicate, r.subject) in g.relations
+        for g in graphs
+        for r in _of(g, predicate)
+    )
+
+
+def _exclusive(graphs: Iterable[SceneGraph], places: Sequence[str]) -> bool:
+    """Whether no thing ever had two places."""
+    return all(
+        max(Counter(r.subject for r in g.relations if r.predicate in places).values(), default=0)
+        <= 1
+        for g in graphs
+    )
+
+
+def _ends(graphs: Iterable[SceneGraph], predicate: str, position: int) -> frozenset[str]:
+    found = set()
+    for g in graphs:
+        for r in _of(g, predicate):
+            node = g.get((r.subject, r.object)[position])
+            if node is not None:
+                found.add(node.category)
+    return frozenset(found)
+
+
+def _values(graphs: Iterable[SceneGraph]) -> dict[str, tuple[str, ...]]:
+    """Attribute → values, the most frequent first, ties by name."""
+    counted: dict[str, Counter[str]] = {}
+    for g in graphs:
+        for n in g.nodes:
+            for attribute, value in n.states:
+                if value is not None:
+                    counted.setdefault(attribute, Counter())[value] += 1
+    return {
+        a: tuple(v for v, _ in sorted(c.items(), key=lambda x: (-x[1], x[0])))
+        for a, c in sorted(counted.items())
+    }
+
+
+def _attributes(graphs: Iterable[SceneGraph]) -> dict[str, tuple[str, ...]]:
+    found: dict[str, set[str]] = {}
+    for g in graphs:
+        for n in g.nodes:
+            known = {a for a, v in n.states if v is not None}
+            found.setdefault(n.category, set()).update(known)
+    return {c: tuple(sorted(a)) for c, a in found.items()}
