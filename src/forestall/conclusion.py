@@ -114,7 +114,5 @@ def _not_judged(context: BoundaryContext, answer: StrategyAnswer, strategy: str)
 
 def _located(graph: SceneGraph, name: str) -> bool:
     return any(
-        node.seen is not Seen.UNOBSERVED or node.centroid_m is not None
-        for node in graph.nodes
-        if name in (node.id, node.category)
+        node.seen is not Seen.UNOBSERVED for node in graph.nodes if name in (node.id, node.category)
     )

@@ -22,7 +22,7 @@ _RECENT = 64
 class GraphView:
     """A scene graph as something that knows facts (implements `evaluate.View`).
 
-    - What is outside every view is unobserved, never false.
+    - What is outside every view is unobserved, never false: a thing, and what it has to others.
     - The inside of a container that no view reached may hold anything that is not in sight.
     """
 
@@ -80,9 +80,21 @@ class GraphView:
             return TRUE
         if subject not in self._nodes or target not in self._nodes:
             return UNOBSERVED
-        if predicate in self._containing and target in self.graph.hidden:
+        if target in self.domain.robot.hands:
+            return FALSE  # a robot knows what it holds
+        containing = predicate in self._containing
+        if self._unseen(target) and not (containing and subject in self._places):
+            return UNOBSERVED
+        if self._unseen(subject) and not containing:
+            return UNOBSERVED
+        if containing and target in self.graph.hidden:
             return UNOBSERVED if self._may_be_hidden(subject) else FALSE
         return FALSE
+
+    def _unseen(self, name: str) -> bool:
+        """Whether a thing is known and no view can reach it: what it has to others is not seen."""
+        node = self._nodes.get(name)
+        return node is not None and node.seen is Seen.UNOBSERVED
 
     def _may_be_hidden(self, name: str) -> bool:
         node = self._nodes[name]
@@ -106,6 +118,8 @@ class GraphView:
         """What may stand at a position so that a relation is not false."""
         other = args[1 - position]
         found = list(self._at.get((predicate, position, other), ()))
+        if self._unseen(other) and not (position == 1 and predicate in self._containing):
+            found.append(UNKNOWN)
         if predicate in self._containing:
             if position == 0 and other in self.graph.hidden:
                 found += [n for n in self.things() if n not in found and self._may_be_hidden(n)]

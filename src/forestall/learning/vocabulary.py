@@ -129,7 +129,7 @@ class Vocabulary:
                 opposite=f"{{0}} not {_spoken(name)} {{1}}",
             )
         for name, values in self.values.items():
-            parameters = (Parameter("?thing", f"has_{name}"),)
+            parameters = (Parameter("?thing"),)
             several = values if len(values) > 1 else (*values, OTHER)
             found[name] = Predicate(
                 name, PredicateKind.ATTRIBUTE, parameters, several, material=False
