@@ -11,7 +11,7 @@ from forestall.assembly.configuration import run_config
 from forestall.assembly.make import make_strategy
 from forestall.conclusion import MonitorConfig
 from forestall.domain.load import shipped
-from forestall.errors import InputError, PerceptionError
+from forestall.errors import InputError, PerceptionError, UnknownNameError
 from forestall.monitor import Monitor
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
@@ -185,6 +185,7 @@ def lost(name: str) -> SceneGraph:
 @pytest.mark.parametrize("graph", [without("Mug"), lost("Mug")])
 def test_an_argument_that_is_not_located_is_not_judged(graph: SceneGraph) -> None:
     monitor, _ = started()
+    assert monitor.before(graph).outcome is Outcome.LOOK
     decision = monitor.before(graph)
     assert decision.outcome is Outcome.NOT_JUDGED
     assert "Mug" in decision.why
@@ -397,3 +398,50 @@ def test_the_real_strategy_on_graphs_of_the_callers_own() -> None:
     assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in monitor.executed)
     strict, _, why = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
     assert strict, why
+
+
+def test_an_unlocated_argument_is_not_looked_for_where_a_caller_goes_on_anyway() -> None:
+    monitor, _ = started(on_not_judged="proceed")
+    decision = monitor.before(without("Mug"))
+    assert (decision.outcome, decision.may_start) == (Outcome.NOT_JUDGED, True)
+
+
+def test_a_single_question() -> None:
+    monitor, strategy = started()
+    decision = monitor.check(scene(), "pick_up(Mug-1)")
+    assert (decision.outcome, decision.may_start) == (Outcome.PROCEED, True)
+    assert strategy.asked[-1].may_look is False
+    assert monitor.check(without("Mug"), "pick_up(Mug)").outcome is Outcome.NOT_JUDGED
+    with pytest.raises(InputError, match="pick_up takes 1"):
+        monitor.check(scene(), "pick_up(Mug, Sink)")
+
+
+def test_a_scene_may_be_written_by_hand() -> None:
+    monitor, _ = started()
+    written = {"objects": ["Mug-1", "Sink-1"], "relations": ["Mug-1 held_by gripper"]}
+    decision = monitor.check(written, "put_in(Mug, Sink)")
+    assert decision.command == Subtask.parse("put_in(Mug-1, Sink-1)")
+
+
+def test_what_was_refused_is_not_tried_again_the_same_way() -> None:
+    monitor, strategy = started()
+    assert monitor.before(scene()).command == Subtask.parse("pick_up(Mug-2)")
+    monitor.after("refused", reason="the mug is behind a pot")
+    monitor.before(scene())
+    assert strategy.asked[-1].refused == (Subtask.parse("pick_up(Mug-2)"),)
+    monitor.start(Plan.parse(["pick_up(Mug)", "pick_up(Mug)", "pick_up(Mug-2)"]))
+    monitor.before(scene())
+    monitor.after("refused")
+    assert monitor.before(scene()).command == Subtask.parse("pick_up(Mug-1)")
+    monitor.after("refused")
+    asked = monitor.before(scene())
+    assert asked.subtask in strategy.asked[-1].refused
+    changed = monitor.before(scene("Mug-2"))
+    assert changed.subtask not in strategy.asked[-1].refused
+
+
+def test_an_outcome_is_one_of_three_words() -> None:
+    monitor, _ = started()
+    monitor.before(scene())
+    with pytest.raises(UnknownNameError, match="refused"):
+        monitor.after("refuse")

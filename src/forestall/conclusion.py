@@ -84,6 +84,8 @@ def conclude(
     why = _not_judged(context, answer, strategy)
     if why:
         may = config.on_not_judged == "proceed"
+        if context.may_look and not may and unlocated(context):
+            return replace(decision, outcome=Outcome.LOOK, may_start=False, why=why)
         return replace(decision, outcome=Outcome.NOT_JUDGED, may_start=may, why=why)
     verdict = answer.verdict
     alarm = verdict is not None and verdict.decision is Decision.REPLAN
@@ -105,11 +107,17 @@ def _not_judged(context: BoundaryContext, answer: StrategyAnswer, strategy: str)
         return verdict.note or "there was nothing to compare with"
     if answer.decision is Decision.LOOK_AGAIN:
         return f"another look is asked for and none is left: {answer.why or verdict.note}"
-    if context.when is When.BEFORE and verdict.decision is Decision.PROCEED:
-        unseen = [n for n in context.subtask.args if not _located(context.graph, n)]
-        if unseen:
-            return f"not located: {', '.join(unseen)}"
-    return ""
+    if verdict.decision is Decision.REPLAN:
+        return ""  # an alarm was judged, whatever else was not seen
+    unseen = unlocated(context)
+    return f"not located: {', '.join(unseen)}" if unseen else ""
+
+
+def unlocated(context: BoundaryContext) -> tuple[str, ...]:
+    """Arguments of the subtask that comes next which are in no view: it cannot be said to fit."""
+    if context.when is not When.BEFORE:
+        return ()
+    return tuple(n for n in context.subtask.args if not _located(context.graph, n))
 
 
 def _located(graph: SceneGraph, name: str) -> bool:

@@ -7,37 +7,50 @@ in a part comes out as the error that it is.
 
     monitor.start(task)
     monitor.observe(first_look)
-    decision = monitor.before(observation)  # proceed · look · replan · hold · not judged
+    decision = monitor.before(scene)  # proceed · look · replan · hold · not judged
     if decision.may_start:
-        monitor.after(robot.execute(decision.command))
+        monitor.after(robot.execute(decision.command))  # or "done", "failed", "refused"
+
+A scene is an observation (RGB-D), a scene graph, or one in its short form (`types.symbolic`).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from forestall.conclusion import MonitorConfig, conclude
-from forestall.errors import InputError
+from forestall.errors import InputError, UnknownNameError
 from forestall.records.boundary import boundary_record
 from forestall.run_state import RunState
 from forestall.types.decision import Hold, MonitorDecision, Outcome
-from forestall.types.episode import ExecutedRecord, SkillOutcome
+from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
 from forestall.types.scene import SceneNeeds
+from forestall.types.symbolic import scene_graph
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Decision
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
     from forestall.seams import Perceiver, Strategy
+
+Scene = Observation | SceneGraph | Mapping[str, Any]
+"""What a caller hands over to be judged."""
+
+ENDED = {
+    "done": SkillStatus.SUCCEEDED,
+    "failed": SkillStatus.FAILED,
+    "refused": SkillStatus.REFUSED,
+}
+"""How a subtask may have ended, in a caller's words."""
 
 
 class Monitor:
@@ -83,15 +96,30 @@ class Monitor:
         if self._perceiver is not None:
             self._perceiver.reset()
 
-    def observe(self, observation: Observation | SceneGraph) -> None:
+    def check(self, scene: Scene, subtask: Subtask | str) -> MonitorDecision:
+        """May this one subtask start in this scene? A run that is going on is forgotten.
+
+        Nobody can look again here: what would call for another look was not judged.
+
+        Args:
+            scene: RGB-D with the robot's own state, a scene graph, or one in its short form.
+            subtask: in text form, or as a value.
+
+        Raises:
+            InputError: the domain has no such skill, or the scene cannot be read.
+        """
+        wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
+        self.start(Plan((self._domain.check(wanted),)))
+        self._run.looks = self._config.max_looks - 1
+        return self.before(scene)
+
+    def observe(self, observation: Scene) -> None:
         """The first look around: it is remembered, nothing is judged."""
         with self._run.phase("perceive"):
             self._see(observation)
         self._run.mark()
 
-    def before(
-        self, observation: Observation | SceneGraph, subtask: Subtask | str | None = None
-    ) -> MonitorDecision:
+    def before(self, observation: Scene, subtask: Subtask | str | None = None) -> MonitorDecision:
         """May the next subtask start?
 
         Args:
@@ -113,22 +141,27 @@ class Monitor:
         )
 
     def after(
-        self, outcome: SkillOutcome, observation: Observation | SceneGraph | None = None
+        self,
+        outcome: SkillOutcome | str,
+        observation: Scene | None = None,
+        reason: str = "",
     ) -> MonitorDecision | None:
-        """The subtask is over; a refusal is evidence that names were bound wrongly.
+        """The subtask is over. A refusal is evidence: the same is not tried again the same way.
 
         Args:
-            outcome: how it ended, as the robot knows it.
+            outcome: how it ended, as the robot knows it; or "done", "failed", "refused".
             observation: what is seen now. A strategy that judges after subtasks answers "look"
                 where it is None, and is then asked again with the same outcome.
+            reason: why, in the robot's words, where the outcome is one of the three words.
 
         Returns:
             None where there is nothing to say.
 
         Raises:
-            InputError: nothing was judged before.
+            InputError: nothing was judged before, or there is no such outcome.
         """
         run = self._run
+        outcome = _ended(outcome, reason)
         if self._awaited is None:
             run.note_executed(outcome)
             run.mark()
@@ -154,7 +187,7 @@ class Monitor:
             self._awaited = None
         return decision
 
-    def finish(self, observation: Observation | SceneGraph | None = None) -> MonitorDecision:
+    def finish(self, observation: Scene | None = None) -> MonitorDecision:
         """The plan is finished: is the task?
 
         Args:
@@ -269,8 +302,10 @@ class Monitor:
             raise InputError("the monitor was not started: call start(task) first")
         return self._state
 
-    def _see(self, observation: Observation | SceneGraph) -> None:
+    def _see(self, observation: Scene) -> None:
         run = self._run
+        if isinstance(observation, Mapping):
+            observation = scene_graph(observation)
         if isinstance(observation, SceneGraph):
             run.graph = replace(observation, subtask=None)
             hand = observation.get(GRIPPER)
@@ -288,14 +323,14 @@ class Monitor:
         when: When,
         index: int,
         subtask: Subtask | None,
-        observation: Observation | SceneGraph,
+        observation: Scene,
         ask: Callable[[BoundaryContext], StrategyAnswer],
     ) -> MonitorDecision:
         """One look of one moment: fuse, ask the strategy, conclude, record."""
         run = self._run
         with run.phase("perceive"):
             self._see(observation)
-            picture = None if isinstance(observation, SceneGraph) else observation
+            picture = observation if isinstance(observation, Observation) else None
             subtask = run.ground() if subtask is None else subtask
             looks = self._config.max_looks
             context = run.context(when, index, subtask, self._scope, picture, looks)
@@ -336,6 +371,14 @@ class Monitor:
     def _look(self, subtask: Subtask, why: str) -> MonitorDecision:
         views = self._run.views(subtask)
         return MonitorDecision(Outcome.LOOK, False, subtask, look_at=views, why=why)
+
+
+def _ended(outcome: SkillOutcome | str, reason: str) -> SkillOutcome:
+    if isinstance(outcome, SkillOutcome):
+        return outcome
+    if outcome not in ENDED:
+        raise UnknownNameError("outcome of a subtask", outcome, ENDED)
+    return SkillOutcome(ENDED[outcome], 0.0, reason)
 
 
 def _whole(graph: SceneGraph, subtask: Subtask) -> SceneGraph:

@@ -25,6 +25,34 @@ if TYPE_CHECKING:
     from forestall.domain.model import Domain
 
 
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """What the robot refused: it will again, as long as nothing about its arguments changes.
+
+    Args:
+        subtask: as it was meant, every argument an instance where it was known.
+        reason: in the robot's words, "" where it gave none.
+        around: what was known of the arguments then.
+    """
+
+    subtask: Subtask
+    reason: str
+    around: frozenset[object]
+
+
+def around(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[object]:
+    """What is known of a subtask's arguments: states, and relations that skills are about."""
+    nodes = [n for n in graph.nodes if n.id in subtask.args]
+    found: set[object] = {(n.id, n.states) for n in nodes}
+    found |= {
+        r
+        for r in graph.relations
+        if (r.subject in subtask.args or r.object in subtask.args)
+        and (r.predicate in domain.moved or r.predicate in domain.containing)
+    }
+    return frozenset(found)
+
+
 @dataclass(slots=True)
 class RunState:
     """What changes while one run goes on.
@@ -42,6 +70,7 @@ class RunState:
         last: what was known before it.
         bound: category → the instance that it means.
         executed: what was tried.
+        refusals: what the robot refused.
         graph: everything that is believed.
         robot_world_m: where the robot stands.
         worked_at: where the hand let go last.
@@ -61,6 +90,7 @@ class RunState:
     last: BoundaryContext | None = None
     bound: dict[str, str] = field(default_factory=dict)
     executed: list[ExecutedRecord] = field(default_factory=list)
+    refusals: list[Refusal] = field(default_factory=list)
     graph: SceneGraph = field(default_factory=lambda: SceneGraph(()))
     final: SceneGraph | None = None
     robot_world_m: Vec3 = (0.0, 0.0, 0.0)
@@ -76,8 +106,22 @@ class RunState:
 
     def ground(self) -> Subtask:
         """The next subtask with instance names where they are known."""
-        planned = self.plan.subtasks[self.position]
-        return ground_subtask(planned, self.graph, self.domain, self.robot_world_m, self.bound)
+        return ground_subtask(
+            self.plan.subtasks[self.position],
+            self.graph,
+            self.domain,
+            self.robot_world_m,
+            self.bound,
+            self.refused(),
+        )
+
+    def refused(self) -> dict[Subtask, str]:
+        """What was refused and would be again → why: nothing about its arguments has changed."""
+        return {
+            r.subtask: r.reason
+            for r in self.refusals
+            if around(self.graph, r.subtask, self.domain) == r.around
+        }
 
     def command(self, subtask: Subtask, position: int) -> Subtask:
         """What to send to the robot for a grounded subtask of the plan."""
@@ -152,6 +196,8 @@ class RunState:
                 self.bound[category_of(name)] = name
         if outcome.status is SkillStatus.REFUSED:
             self.bound.clear()
+            known = around(self.last.graph, subtask, self.domain)
+            self.refusals.append(Refusal(subtask, outcome.reason, known))
         self.worked_at = outcome.hand_world_m
         command = self.command(subtask, self.position)
         self.executed.append(ExecutedRecord(command, outcome, self.boundary - 1))
@@ -183,6 +229,7 @@ class RunState:
             may_look=look < max_looks,
             replans=self.replans,
             when=when,
+            refused=tuple(self.refused()),
         )
 
     @contextmanager

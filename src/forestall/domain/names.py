@@ -8,13 +8,13 @@ would that opens a fridge to look for "the egg".
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
 from forestall.domain.truth import view
-from forestall.types.facts import Literal, Truth, is_instance
+from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.observation import Vec3
 from forestall.types.plan import Subtask
@@ -26,6 +26,7 @@ def ground_subtask(
     domain: Domain,
     robot_world_m: Vec3,
     bound: Mapping[str, str],
+    refused: Collection[Subtask] = (),
 ) -> Subtask:
     """Replace category names by instance names.
 
@@ -39,6 +40,7 @@ def ground_subtask(
         domain: what names and skills mean.
         robot_world_m: where the robot stands.
         bound: category → instance, from earlier subtasks of the same episode.
+        refused: what the robot would refuse: another instance is meant, where there is one.
     """
     skill = domain.skill(subtask.skill)
     names = []
@@ -57,7 +59,36 @@ def ground_subtask(
             names.append(bound[category])
         else:
             names.append(_nearest(nodes, graph, domain, robot_world_m) or category)
-    return Subtask(subtask.skill, tuple(names))
+    meant = Subtask(subtask.skill, tuple(names))
+    if meant not in refused:
+        return meant
+    return _otherwise(subtask, meant, graph, domain, robot_world_m, refused) or meant
+
+
+def _otherwise(
+    planned: Subtask,
+    meant: Subtask,
+    graph: SceneGraph,
+    domain: Domain,
+    robot_world_m: Vec3,
+    refused: Collection[Subtask],
+) -> Subtask | None:
+    """The same with another instance of a category that the plan names, the last argument first."""
+    for position in reversed(range(len(planned.args))):
+        raw = domain.canonical(planned.args[position])
+        if is_instance(raw) or raw in domain.robot.hands:
+            continue
+        nodes = graph.of_category(category_of(meant.args[position]))
+        while nodes:
+            nearest = _nearest(nodes, graph, domain, robot_world_m)
+            if nearest is None:
+                break
+            args = (*meant.args[:position], nearest, *meant.args[position + 1 :])
+            other = Subtask(meant.skill, args)
+            if other not in refused and len(set(args)) == len(set(meant.args)):
+                return other
+            nodes = tuple(n for n in nodes if n.id != nearest)
+    return None
 
 
 def executable(subtask: Subtask, planned: Subtask, domain: Domain) -> Subtask:

@@ -117,6 +117,18 @@ class Intervention:
             producer=GOAL_CHECK,
         )
 
+    def refused(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer:
+        """The robot refused this very subtask, and nothing about it has changed: another way."""
+        _, goal = self.check_goal(context, clock)
+        verdict = checked(SKILL_STATUS, False, "the robot has refused this subtask before")
+        diagnosis = Diagnosis(
+            cause=f"the robot has refused {context.subtask}, and nothing about it has changed",
+            must_change=goal.must_change,
+            culprits=context.subtask.args,
+            producer=SKILL_STATUS,
+        )
+        return self.alarm(context, verdict, diagnosis, clock)
+
     def alarm(
         self,
         context: BoundaryContext,

@@ -46,6 +46,8 @@ class Proactive:
         """Retrieve, compare; on an alarm diagnose and replan."""
         self._intervention.begin(context)
         clock = Clock()
+        if context.subtask in context.refused:
+            return self._intervention.refused(context, clock)
         if self._intervention.repairs(context):
             return self._intervention.check_rest(context, clock)
         references = tuple(
@@ -59,9 +61,14 @@ class Proactive:
             return StrategyAnswer(Decision.LOOK_AGAIN, verdict, seconds=clock.items())
         if verdict.decision is Decision.PROCEED:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        unseen = verdict.decision is Decision.LOOK_AGAIN
         verdict = replace(verdict, decision=Decision.REPLAN)
         diagnosis = self._reasoner.diagnose(context, verdict)
         clock.lap("diagnose")
+        if unseen and not diagnosis.must_change:
+            return StrategyAnswer(
+                Decision.LOOK_AGAIN, verdict, diagnosis, None, verdict.note, clock.items()
+            )
         return self._intervention.alarm(context, verdict, diagnosis, clock)
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
