@@ -72,3 +72,17 @@ class MonitorDecision:
     seconds: tuple[tuple[str, float], ...] = ()
     context: BoundaryContext | None = None
     record: BoundaryRecord | None = None
+
+    def __str__(self) -> str:
+        """The answer in words: outcome, subtask, why; what to do instead on lines of their own."""
+        about = "" if self.subtask is None else f" before {self.subtask}"
+        cause = "" if self.diagnosis is None else self.diagnosis.cause
+        why = cause if self.outcome is Outcome.REPLAN else (self.why or cause)
+        if self.outcome is Outcome.HOLD and self.hold is not None and not why:
+            why = self.hold.value
+        lines = [f"{self.outcome.value}{about}" + (f": {why}" if why else "")]
+        if cause and cause not in why:
+            lines.append(f"  cause: {cause}")
+        if self.plan is not None:
+            lines.append(f"  plan: {'; '.join(self.plan.texts())}")
+        return "\n".join(lines)

@@ -1,0 +1,101 @@
+"""The monitor with the ways to make one: `forestall.Monitor`.
+
+Called by users; calls `sources`, `learning` and the registry's parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from forestall.assembly.configuration import Choice, Given, choices
+from forestall.assembly.options import built
+from forestall.assembly.parts import Assembly
+from forestall.assembly.registry import find
+from forestall.assembly.sources import Source, demonstrations_from
+from forestall.conclusion import MonitorConfig
+from forestall.domain.load import load_domain
+from forestall.domain.model import Domain
+from forestall.kinds import DOMAIN, PERCEIVER, STRATEGY
+from forestall.learning.learn import learn
+from forestall.monitor import Monitor as RunMonitor
+from forestall.types.demonstration import Demonstration
+
+DEFAULTS = Given.named({"detector": "preconditions", "segmenter": "given-masks", "states": "given"})
+"""What a monitor of somebody's own has where nothing is said: it judges by what always held, which
+needs no scene of the same kind; masks and states are those that an observation brings."""
+
+
+class Monitor(RunMonitor):
+    """Says before each subtask whether it may start; see `forestall.monitor` for a run.
+
+    Attributes:
+        domain: skills, relations and attributes, as given or as learnt.
+        demonstrations: what scenes are compared with.
+        limits: what cannot be judged or done, a sentence each; none where a domain was given.
+    """
+
+    domain: Domain
+    demonstrations: tuple[Demonstration, ...]
+    limits: tuple[str, ...]
+
+    @classmethod
+    def from_demonstrations(
+        cls,
+        source: Source,
+        domain: Domain | str | Path | None = None,
+        *,
+        hands: Sequence[str] | None = None,
+        config: MonitorConfig | None = None,
+        **options: Any,
+    ) -> Monitor:
+        """A monitor that compares with demonstrations.
+
+        Args:
+            source: a memory file, folders of runs, graphs, lists of (subtask, scene), or a mixture;
+                see `assembly.sources`.
+            domain: a domain, its name, or a file of one. Without it skills, relations and
+                attributes are those that the demonstrations use, what always held before a skill
+                is needed, what always changed is what it does; `limits` says what that leaves out.
+            hands: node ids of the robot's hands for a domain that is learnt; by default the nodes
+                that are called grippers.
+            config: bounds and policies; by default the robot holds where nothing was judged.
+            **options: parts and their options: `detector="scene-graph"`,
+                `detector={"name": "preconditions", "threshold": 0.3}`; `forestall parts` lists
+                them. `Given` as the keyword `given` is what a file or flags said.
+
+        Raises:
+            InputError: a source, a name or an option that is not valid; says what would be.
+        """
+        demonstrations = demonstrations_from(source)
+        limits: tuple[str, ...] = ()
+        if domain is None:
+            learnt = learn(demonstrations, hands=hands)
+            own, limits = learnt.domain, learnt.limits
+        else:
+            own = _domain(domain)
+        given: Given = options.pop("given", Given())
+        said = Given.named(options).over(given).over(DEFAULTS)
+        chosen = tuple(
+            Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
+        )
+        parts = Assembly(chosen, own, demonstrations, {"states": {}})
+        monitor = cls(
+            parts.part(STRATEGY),
+            own,
+            None if domain is None else parts.part(PERCEIVER),
+            config,
+        )
+        monitor.domain, monitor.limits = own, limits
+        monitor.demonstrations = tuple(demonstrations)
+        return monitor
+
+
+def _domain(said: Domain | str | Path) -> Domain:
+    if isinstance(said, Domain):
+        return said
+    if isinstance(said, Path) or said.endswith((".toml", ".pddl")):
+        return load_domain(str(said))
+    found: Domain = built(find(DOMAIN.name, said), {}, None)
+    return found

@@ -1,0 +1,237 @@
+"""Demonstrations from whatever shows one: a memory file, runs, graphs, steps in Python, a mixture.
+
+Called by `monitor` and the command line; calls memory and records. A demonstration that somebody
+wrote is one JSON file, or one list of steps in Python:
+
+    [("grasp(peg-1)", scene), ("insert(peg-1, hole-1)", scene), last_scene]
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import forestall
+from forestall.errors import FileFormatError, ForestallError, InputError
+from forestall.memory.codec import encode
+from forestall.memory.recording import demonstration_from
+from forestall.memory.store import open_store
+from forestall.records.record import read_record
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.facts import is_instance
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Subtask
+from forestall.types.symbolic import scene_graph
+
+MEMORY_SUFFIXES = (".db", ".sqlite", ".sqlite3")
+RECORD_FILES = ("record.json", "boundaries.jsonl")
+WRITTEN_KEYS = ("task", "scene", "steps", "final")
+_PAIR = 2
+
+Source = Any
+"""A path, a `Demonstration`, a list of steps, or an iterable of these."""
+
+
+def demonstrations_from(source: Source) -> list[Demonstration]:
+    """Every demonstration of a source.
+
+    Args:
+        source: a memory file; the folder of a run; a JSON file of a demonstration that somebody
+            wrote (`written`), or of one graph with its subtask; a folder of any of these; a
+            `Demonstration`; a list of steps; or an iterable of all that.
+
+    Returns:
+        Demonstrations with ids that differ, in the order of the source.
+
+    Raises:
+        InputError: something that is no demonstration, with its place.
+        MemoryFileError: see `memory.store`.
+    """
+    found = _from(source)
+    if not found:
+        raise InputError(f"no demonstration was found in {_said(source)}")
+    return _named(found)
+
+
+def written(data: Any, folder: Path | None = None) -> Demonstration:
+    """A demonstration as somebody wrote it.
+
+    Args:
+        data: {"task", "scene", "steps": [{"subtask", "scene"}], "final"}; a scene is a graph in
+            its short form or in JSON, or the name of a file with one. Or a list of
+            (subtask, scene), behind which may stand the scene after the last one.
+        folder: where files are looked for; None: scenes are not in files.
+
+    Raises:
+        InputError: what cannot be read, with the number of the step.
+    """
+    if isinstance(data, Mapping):
+        for key in data:
+            if key not in WRITTEN_KEYS:
+                known = ", ".join(WRITTEN_KEYS)
+                raise InputError(f"a demonstration has no entry {key!r}: known are {known}")
+        steps = data.get("steps")
+        if not isinstance(steps, Sequence) or isinstance(steps, str):
+            raise InputError('a demonstration needs \'steps\', a list of {"subtask", "scene"}')
+        pairs = [_pair(number, step) for number, step in enumerate(steps, 1)]
+        final, task = data.get("final"), str(data.get("task", ""))
+        scene = str(data.get("scene", ""))
+    else:
+        ends = bool(data) and not _is_pair(data[-1])
+        pairs = [_pair(n, step) for n, step in enumerate(data[: len(data) - ends], 1)]
+        final, task, scene = (data[-1] if ends else None), "", ""
+    if not pairs:
+        raise InputError("a demonstration needs one step at least")
+    made = []
+    for number, (subtask, given) in enumerate(pairs, 1):
+        try:
+            graph = _scene(given, folder)
+            made.append(_step(number - 1, subtask, graph))
+        except InputError as error:
+            raise InputError(f"step {number}: {error}") from error
+    last = None if final is None else _scene(final, folder)
+    return Demonstration(task, scene, 0, tuple(made), version=forestall.__version__, final=last)
+
+
+def _from(source: Source) -> list[Demonstration]:
+    if isinstance(source, Demonstration):
+        return [source]
+    if isinstance(source, str | Path):
+        return _from_path(Path(source))
+    if isinstance(source, Mapping) or _is_steps(source):
+        return [written(source)]
+    if isinstance(source, Iterable):
+        found = []
+        for number, part in enumerate(source, 1):
+            try:
+                found += _from(part)
+            except InputError as error:
+                raise InputError(f"demonstration {number}: {error}") from error
+        return found
+    raise InputError(
+        f"{_said(source)} shows no demonstration: give a memory file, the folder of a run, a "
+        "demonstration in JSON, a list of (subtask, scene), or a list of these"
+    )
+
+
+def _from_path(path: Path) -> list[Demonstration]:
+    if not path.exists():
+        raise FileFormatError(f"{path}: there is no such file or folder")
+    if path.is_file() and path.suffix in MEMORY_SUFFIXES:
+        with open_store(path) as store:
+            return list(store.required())
+    if path.is_file() and path.suffix == ".json" and path.name not in RECORD_FILES:
+        return [_from_json(path)]
+    if path.name in RECORD_FILES or any((path / name).is_file() for name in RECORD_FILES):
+        found = demonstration_from(read_record(path), forestall.__version__)
+        if found is None:
+            raise InputError(
+                f"{path} is no demonstration: only a finished run becomes one that succeeded "
+                "without a new plan, a refusal or a failure on the way"
+            )
+        return [found]
+    if path.is_dir():
+        return [
+            d for inside in sorted(path.iterdir()) if _shows(inside) for d in _from_path(inside)
+        ]
+    known = ", ".join((".json", *MEMORY_SUFFIXES))
+    raise FileFormatError(f"{path} shows no demonstration: files may be {known}")
+
+
+def _shows(path: Path) -> bool:
+    """Whether something in a folder is meant to be read."""
+    if path.is_dir():
+        return any((path / name).is_file() for name in RECORD_FILES)
+    return path.suffix in (".json", *MEMORY_SUFFIXES)
+
+
+def _from_json(path: Path) -> Demonstration:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        raise FileFormatError(f"cannot read demonstration {path}: {error}") from error
+    try:
+        if isinstance(data, dict) and "steps" in data:
+            return written(data, path.parent)
+        if isinstance(data, dict) and data.get("subtask"):
+            graph = scene_graph(data)
+            assert graph.subtask is not None, "its text is not empty"
+            return written({"steps": [{"subtask": str(graph.subtask), "scene": graph}]})
+        raise InputError("neither a demonstration with 'steps' nor a graph with its 'subtask'")
+    except ForestallError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+
+
+def _is_pair(step: Any) -> bool:
+    return (
+        isinstance(step, Sequence)
+        and not isinstance(step, str)
+        and len(step) == _PAIR
+        and isinstance(step[0], str | Subtask)
+    )
+
+
+def _is_steps(source: Source) -> bool:
+    return isinstance(source, Sequence) and bool(source) and _is_pair(source[0])
+
+
+def _pair(number: int, step: Any) -> tuple[Subtask, Any]:
+    if isinstance(step, Mapping) and {"subtask", "scene"} == step.keys():
+        step = (step["subtask"], step["scene"])
+    if not _is_pair(step):
+        raise InputError(f"step {number}: a subtask and its scene are expected, not {_said(step)}")
+    said, scene = step
+    try:
+        return (Subtask.parse(said) if isinstance(said, str) else said), scene
+    except InputError as error:
+        raise InputError(f"step {number}: {error}") from error
+
+
+def _scene(given: Any, folder: Path | None) -> SceneGraph:
+    if not isinstance(given, str):
+        return scene_graph(given)
+    if folder is None:
+        raise InputError(f"the scene {given!r} is a name: give the scene itself")
+    place = (folder / given).resolve()
+    if not place.is_relative_to(folder.resolve()):
+        raise FileFormatError(f"the scene {given!r} is outside the folder {folder}")
+    try:
+        return scene_graph(json.loads(place.read_text(encoding="utf-8-sig")))
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        raise FileFormatError(f"cannot read scene {place}: {error}") from error
+
+
+def _step(index: int, subtask: Subtask, graph: SceneGraph) -> DemonstrationStep:
+    """A step whose arguments are the graph's own nodes, where a name can mean one only."""
+    names = []
+    for name in subtask.args:
+        fitting = graph.matches(name)
+        if len(fitting) > 1 and not is_instance(name):
+            raise InputError(f"{name!r} of {subtask} can be {' or '.join(fitting)}: name one")
+        names.append(fitting[0] if fitting else name)
+    ground = replace(subtask, args=tuple(names))
+    whole = replace(graph, subtask=None)
+    return DemonstrationStep(index, ground, replace(graph, subtask=ground), whole)
+
+
+def _named(found: Iterable[Demonstration]) -> list[Demonstration]:
+    """With ids, which those lack that somebody wrote; equal ones are told apart by number."""
+    used: set[str] = set()
+    named = []
+    for d in found:
+        name = d.id or f"{d.task or 'written'}-{encode(d).digest[:12]}"
+        number, own = 1, name
+        while own in used:
+            number += 1
+            own = f"{name}-{number}"
+        used.add(own)
+        named.append(replace(d, id=own))
+    return named
+
+
+def _said(source: Source) -> str:
+    text = str(source) if isinstance(source, str | Path) else type(source).__name__
+    return repr(text) if isinstance(source, str) else text
