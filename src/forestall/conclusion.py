@@ -105,11 +105,11 @@ def _not_judged(context: BoundaryContext, answer: StrategyAnswer, strategy: str)
         return answer.why or f"the strategy {strategy} does not judge here"
     if not verdict.judged:
         return verdict.note or "there was nothing to compare with"
-    if answer.decision is Decision.LOOK_AGAIN:
-        return f"another look is asked for and none is left: {answer.why or verdict.note}"
-    if verdict.decision is Decision.REPLAN:
-        return ""  # an alarm was judged, whatever else was not seen
     unseen = unlocated(context)
+    if answer.decision is Decision.LOOK_AGAIN and not unseen:
+        return f"another look is asked for and none is left: {answer.why or verdict.note}"
+    if answer.decision is not Decision.LOOK_AGAIN and verdict.decision is Decision.REPLAN:
+        return ""  # an alarm was judged, whatever else was not seen
     return f"not located: {', '.join(unseen)}" if unseen else ""
 
 

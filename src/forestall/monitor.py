@@ -106,10 +106,12 @@ class Monitor:
             subtask: in text form, or as a value.
 
         Raises:
-            InputError: the domain has no such skill, or the scene cannot be read.
+            InputError: the subtask's arguments do not fit, or the scene cannot be read.
         """
         wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
-        self.start(Plan((self._domain.check(wanted),)))
+        if wanted.skill in self._domain.skills:
+            self._domain.check(wanted)
+        self.start(Plan((wanted,)))
         self._run.looks = self._config.max_looks - 1
         return self.before(scene)
 
@@ -136,6 +138,9 @@ class Monitor:
             limit = Hold.SUBTASK_LIMIT
             return MonitorDecision(Outcome.HOLD, False, run.ground(), hold=limit, why=why)
         self._awaited, run.ready = None, False
+        unknown = self._unknown_skill()
+        if unknown is not None:
+            return unknown
         return self._judge(
             When.BEFORE, run.position, None, observation, self._strategy.before_subtask
         )
@@ -301,6 +306,15 @@ class Monitor:
         if self._state is None:
             raise InputError("the monitor was not started: call start(task) first")
         return self._state
+
+    def _unknown_skill(self) -> MonitorDecision | None:
+        """Of a skill that the domain lacks nothing can be judged; it is not sent to the robot."""
+        planned = self._run.plan.subtasks[self._run.position]
+        try:
+            self._domain.skill(planned.skill)
+        except UnknownNameError as error:
+            return MonitorDecision(Outcome.NOT_JUDGED, False, planned, why=str(error))
+        return None
 
     def _see(self, observation: Scene) -> None:
         run = self._run

@@ -53,7 +53,6 @@ def test_lifted_literals() -> None:
         "dirty(?object)=clean",
         "held_by(?object, gripper)",
         "not inside(?object, ?target)",
-        "not on_top_of(?object, ?target)",
         "on_top_of(Potato, ?object)",
         "open(?target)=open",
         "toggled(?target)=off",

@@ -200,7 +200,7 @@ def test_a_graph_may_start_a_world_and_an_observation_needs_one_or_a_frame():
     start = SceneGraph((ObjectNode("Tray-1", "Tray"), ObjectNode("Unheard-1", "Unheard")))
     world = SymbolicWorld(BENCH, start)
     world.reset(9)
-    assert {n.id for n in world.truth().nodes} == {"Tray-1", "gripper"}
+    assert {n.id for n in world.truth().nodes} == {"Tray-1", "Unheard-1", "gripper"}
     hand = GripperState(None, (0.0, 0.0, 0.0))
     with pytest.raises(PerceptionError, match="at least one frame, or a scene graph"):
         Observation((), hand, 0.0)

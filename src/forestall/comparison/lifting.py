@@ -6,6 +6,7 @@ collects the true ones, the negative ones included.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
 from itertools import permutations
 
@@ -61,7 +62,7 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
             candidates |= _about_movable(variable, skill, domain)
         if not domain.is_open_support(category.name) and domain.offers(category.name):
             candidates |= _contents(graph, node.id, variable, roles, domain)
-    candidates |= _between(tuple(roles), domain) | _derived(tuple(roles), domain)
+    candidates |= _between(roles, graph, domain) | _derived(tuple(roles), domain)
     held = graph.holding
     if held is not None and known.holding and held not in roles.values():
         node = graph.get(held)
@@ -70,17 +71,23 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
     return frozenset(c for c in candidates if evaluate(c, graph, subtask, domain) is Truth.TRUE)
 
 
-def _between(variables: tuple[str, ...], domain: Domain) -> set[Literal]:
-    """Relations that skills are about, between arguments; denied in the order of the parameters."""
+def _between(roles: Mapping[str, str], graph: SceneGraph, domain: Domain) -> set[Literal]:
+    """Relations that skills are about, between arguments.
+
+    Denied only in the order of the parameters, and where the second can have such a thing at all.
+    """
     apart = (domain.roles.holding, domain.roles.blocking)
     predicates = {*domain.containing, *(p for p in domain.relations if p in domain.moved)}
-    return {
-        Literal(predicate, pair, value)
-        for predicate in predicates.difference(apart)
-        for pair in permutations(variables, 2)
-        for value in ("true", "false")
-        if value == "true" or variables.index(pair[0]) < variables.index(pair[1])
-    }
+    order, found = tuple(roles), set[Literal]()
+    for predicate in predicates.difference(apart):
+        offered = domain.predicates[predicate].offered_by or None
+        for pair in permutations(order, 2):
+            found.add(Literal(predicate, pair))
+            node = graph.get(roles[pair[1]])
+            place = roles[pair[1]] if node is None else node.category
+            if order.index(pair[0]) < order.index(pair[1]) and domain.is_a(place, offered):
+                found.add(Literal(predicate, pair, "false"))
+    return found
 
 
 def _derived(variables: tuple[str, ...], domain: Domain) -> set[Literal]:

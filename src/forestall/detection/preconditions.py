@@ -30,6 +30,9 @@ from forestall.types.verdict import (
     demonstrations_of,
 )
 
+_TOLD = 3
+"""How many facts a note names."""
+
 _KEPT = 256
 """How many sets of mined preconditions are remembered."""
 
@@ -61,7 +64,8 @@ class PreconditionDetector:
     """Judges by mined preconditions (implements `Detector`).
 
     - a precondition is violated whose weight the threshold asks for: replan;
-    - none is, but one could not be observed: look again, because what was not seen is neither;
+    - none is, but one could not be observed, or an argument has a relation that the domain does
+      not know: look again, because what was not seen or not known is neither;
     - all hold: proceed;
     - nothing was mined: proceed without a score and with a note; nothing was judged.
 
@@ -105,10 +109,21 @@ class PreconditionDetector:
         if score < self._config.threshold:
             return self._verdict(Decision.REPLAN, score, references, _listed("violated", false))
         unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
-        if unseen:
-            note = _listed("not observed", unseen)
+        strange = self._strange(observed, subtask)
+        if unseen or strange:
+            seen_not = [_listed("not observed", unseen)] if unseen else []
+            note = "; ".join([*strange, *seen_not])
             return self._verdict(Decision.LOOK_AGAIN, score, references, note)
         return self._verdict(Decision.PROCEED, score, references)
+
+    def _strange(self, observed: SceneGraph, subtask: Subtask) -> list[str]:
+        """What is said of an argument in words that the domain lacks: it may matter or not."""
+        return [
+            f"{r}: nothing is known of the relation {r.predicate}, so it may matter"
+            for r in observed.relations
+            if r.predicate not in self._domain.predicates
+            and (r.subject in subtask.args or r.object in subtask.args)
+        ]
 
     def _preconditions(
         self, references: Sequence[Reference], subtask: Subtask
@@ -149,6 +164,8 @@ def weight(violation: Violation) -> float:
 
 def _listed(what: str, found: Sequence[Violation]) -> str:
     texts = [
-        f"{v.literal} (held in {v.precondition.support} of {v.precondition.total})" for v in found
+        f"{v.literal} (held in {v.precondition.support} of {v.precondition.total})"
+        for v in found[:_TOLD]
     ]
-    return f"{what}: {', '.join(texts)}"
+    more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
+    return f"{what}: {', '.join(texts)}{more}"

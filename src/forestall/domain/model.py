@@ -6,8 +6,8 @@ executors. It holds no code of any domain: what a skill needs and does are formu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from forestall.domain.formula import Formula, literals
@@ -34,6 +34,9 @@ FACING = "facing"
 
 SAME = "same"
 SAME_CATEGORY = "same_category"
+_WIDER = 32
+"""How many sets of unknown categories a domain keeps itself with."""
+
 BUILT_IN = (LOCATED, FACING, SAME, SAME_CATEGORY)
 
 
@@ -102,6 +105,23 @@ class Domain:
     @cached_property
     def _aliases(self) -> dict[str, str]:
         return {a: c.name for c in self.categories.values() for a in c.aliases}
+
+    def knowing(self, categories: Iterable[str]) -> Domain:
+        """The same domain, in which some further categories are things and nothing more.
+
+        What nobody has described is still there, takes up its place, and is not handled.
+        """
+        unknown = frozenset(c for c in categories if self.find(c) is None)
+        if not unknown:
+            return self
+        wider: dict[frozenset[str], Domain] = self.__dict__.setdefault("_wider", {})
+        found = wider.get(unknown)
+        if found is None:
+            if len(wider) >= _WIDER:
+                wider.clear()
+            more = {c: Category(c) for c in sorted(unknown)}
+            found = wider[unknown] = replace(self, categories={**self.categories, **more})
+        return found
 
     def kinds(self, category: str) -> frozenset[str]:
         """Everything that a category counts as: its name, its tags, "has_<attribute>"."""

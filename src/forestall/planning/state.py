@@ -74,22 +74,23 @@ class State:
 
     @classmethod
     def from_graph(cls, graph: SceneGraph, domain: Domain) -> State:
-        """Read a scene graph; nodes of categories that the domain lacks are left out.
+        """Read a scene graph; what is of a category that the domain lacks is a thing, no more.
 
         An unobserved attribute takes its default and is listed in `assumed`, as is the emptiness
         of every hidden container. A thing with neither box nor place is lost.
         """
-        state = cls(domain, {})
-        roles, hands = domain.roles, domain.robot.hands
+        hands = domain.robot.hands
+        domain = domain.knowing(n.category for n in graph.nodes if n.id not in hands)
+        state, roles = cls(domain, {}), domain.roles
         lost, assumed = set(), set()
         held = {r.subject for r in graph.relations if r.predicate == roles.holding}
         placed = held | {r.subject for r in graph.relations if r.predicate in domain.containing}
         for node in graph.nodes:
-            category = domain.categories.get(node.category)
-            if node.id in hands or category is None:
+            if node.id in hands:
                 continue
-            state.kinds[node.id] = node.category
-            for attribute, default in domain.default_states(node.category).items():
+            category = domain[node.category]
+            state.kinds[node.id] = category.name
+            for attribute, default in domain.default_states(category.name).items():
                 value = node.state(attribute)
                 if value is None:
                     assumed.add(Literal(attribute, (node.id,), default))

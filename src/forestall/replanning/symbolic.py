@@ -82,8 +82,8 @@ class PlannerReplanner:
                     return accepted
             repairs.append(repair)
         for repair in (*repairs[:1], Planned(ReplanOutcome.SOLVED, (), state)):
-            if repair.final is None:
-                continue
+            if repair.final is None or not context.task.goal.literals:
+                continue  # without a goal there is nothing to plan for but what was left
             onward = attempts.count(plan_goal(repair.final, context.task.goal, self.config))
             if onward.outcome is ReplanOutcome.SOLVED:
                 steps = (*repair.subtasks, *onward.subtasks)
