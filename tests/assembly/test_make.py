@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,7 +33,7 @@ PLAIN = Given.named(
 )
 
 
-def plain(task: str, scenario: str | None = None, **named: object) -> RunConfig:
+def plain(task: str, scenario: str | None = None, **named: Any) -> RunConfig:
     return run_config(task, scenario, given=PLAIN, **named)
 
 
@@ -97,7 +98,7 @@ def test_a_ready_made_memory_is_of_the_parts_that_it_is_recorded_with(
     assert ready_made(plain("toast-bread", detector="image", strategy="online")) == one
     assert len(recorded) == 4
     assert ready_made(plain("toast-bread", image_encoder="clip")) != one
-    assert ready_made(plain("toast-bread", **{"world.gravity": 1.6})) != one
+    assert ready_made(plain("toast-bread", **dict[str, Any]({"world.gravity": 1.6}))) != one
     assert recorded[-1].config(1).choice(WORLD).options == {"gravity": 1.6}
 
 

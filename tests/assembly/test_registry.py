@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -73,7 +74,7 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         sys.modules.pop(name, None)
 
 
-def made(**named: object) -> object:
+def made(**named: Any) -> object:
     return Assembly(run_config("heat-potato", **named).choices, shipped("household")).part(DETECTOR)
 
 
@@ -131,7 +132,7 @@ def test_options_of_others_are_checked_like_ours(plugin: None) -> None:
 
 def test_one_ours_that_cannot_be_imported_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     table = registry.Table(SEGMENTER, "torn", {"torn": "forestall.absent:Segmenter"})
-    monkeypatch.setitem(TABLES, "segmenter", table)  # type: ignore[misc]
+    monkeypatch.setitem(TABLES, "segmenter", table)
     with pytest.raises(InputError, match=r"segmenter 'torn' cannot be loaded \(forestall.absent"):
         find("segmenter", "torn")
 

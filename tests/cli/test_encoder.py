@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def test_figures_tables_and_page_of_the_shipped_encoder(
     ],
 )
 def test_unknown_names_are_refused_before_anything_is_built(
-    change: dict[str, str], message: str
+    change: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(UnknownNameError, match=message):
         prepare(run_config("heat-potato", **change))

@@ -115,11 +115,11 @@ def test_burners_are_told_apart_by_number_and_not_by_look() -> None:
     first = looking(scene("StoveBurner-1"), StoveBurner_1=EAST)
     fourth = looking(scene("StoveBurner-4"), StoveBurner_4=EAST)
     assert score(fourth, first)[1] == ()
-    on = [
+    fourth_on, first_on = (
         replace(g, subtask=scene("", "", f"toggle_on({g.nodes[0].id})").subtask)
         for g in (fourth, first)
-    ]
-    assert score(*on)[0].score == 1.0
+    )
+    assert score(fourth_on, first_on)[0].score == 1.0
 
 
 @pytest.mark.parametrize("things", ["Mug-1", "Cup-1", "Mug-1 dirty=dirty"])
@@ -143,10 +143,10 @@ def test_other_features_do_not_look(feature: Feature) -> None:
     config = ScoreConfig(feature=feature)
     rng = np.random.default_rng(2)
     one, other = (random_graph(12, rng, DOMAIN, feature_size=8) for _ in range(2))
-    bare = [
+    bare_one, bare_other = (
         replace(g, nodes=tuple(replace(n, feature=None) for n in g.nodes)) for g in (one, other)
-    ]
-    assert score(one, other, config) == score(*bare, config)
+    )
+    assert score(one, other, config) == score(bare_one, bare_other, config)
 
 
 def test_features_of_two_encoders_do_not_compare() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -126,7 +128,7 @@ TRUTHS = {
 
 
 @pytest.mark.parametrize("text", TRUTHS)
-def test_what_formulas_mean(text: str, tmp_path) -> None:
+def test_what_formulas_mean(text: str, tmp_path: Path) -> None:
     file = tmp_path / "lamps.toml"
     file.write_text(LAMPS)
     state = State(

@@ -15,6 +15,8 @@ def bench(*specs: str, without: str = "", domain: Domain = BENCH) -> SymbolicWor
     start = start_scene(domain, SceneNeeds(clutter=(0, 0)), 0)
     nodes = {n.id: n for n in start.nodes if n.category != without}
     relations = []
+    holding, blocking = domain.roles.holding, domain.roles.blocking
+    assert holding is not None and blocking is not None
     for spec in specs:
         head, *states = spec.split()
         head, _, behind = head.partition("#")
@@ -23,11 +25,11 @@ def bench(*specs: str, without: str = "", domain: Domain = BENCH) -> SymbolicWor
         values = domain.default_states(category) | dict(s.split("=") for s in states)
         nodes[name] = ObjectNode(name, category, tuple(values.items()))
         if place in domain.robot.hands:
-            relations.append(Relation(name, domain.roles.holding, place))
+            relations.append(Relation(name, holding, place))
         elif place:
             at = relation_at(domain, name, place)
             relations.append(Relation(name, at, place))
         if behind:
-            relations.append(Relation(name, domain.roles.blocking, behind))
+            relations.append(Relation(name, blocking, behind))
     nodes |= {h: ObjectNode(h, h) for h in domain.robot.hands}
     return SymbolicWorld(domain, SceneGraph(tuple(nodes.values()), tuple(relations)))

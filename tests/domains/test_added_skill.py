@@ -5,6 +5,7 @@ from importlib.resources import files
 import pytest
 
 from forestall.domain.load import load_domain
+from forestall.domain.model import Domain
 from forestall.planning.planner import plan_goal
 from forestall.planning.state import State
 from forestall.testing.symbolic_world import SymbolicWorld
@@ -34,7 +35,7 @@ tags = ["pickupable"]
 
 
 @pytest.fixture(scope="module")
-def household(tmp_path_factory):
+def household(tmp_path_factory: pytest.TempPathFactory) -> Domain:
     text = files("forestall").joinpath("domains", "household", "domain.toml").read_text("utf-8")
     file = tmp_path_factory.mktemp("domain") / "household.toml"
     file.write_text(text + WIPE, encoding="utf-8")
@@ -42,7 +43,7 @@ def household(tmp_path_factory):
 
 
 @pytest.fixture
-def world(household):
+def world(household: Domain) -> SymbolicWorld:
     needs = SceneNeeds(
         objects=(
             ObjectNeed("Plate-1", "Plate", ("CounterTop",), (("dirty", "dirty"),)),
@@ -52,7 +53,7 @@ def world(household):
     return SymbolicWorld(household, needs)
 
 
-def test_wiping_is_planned(household, world):
+def test_wiping_is_planned(household: Domain, world: SymbolicWorld) -> None:
     state = State.from_graph(world.truth(), household)
     goal = Goal("the plate is clean", literals=(Literal.parse("dirty(Plate-1)=clean"),))
     planned = plan_goal(state, goal)
@@ -63,7 +64,7 @@ def test_wiping_is_planned(household, world):
     assert world.states("Plate-1")["dirty"] == "clean"
 
 
-def test_wiping_is_executed(world):
+def test_wiping_is_executed(world: SymbolicWorld) -> None:
     wipe, pick = Subtask.parse("wipe(Plate)"), Subtask.parse("pick_up(Sponge)")
     refused = world.execute(wipe)
     assert refused.status is SkillStatus.REFUSED

@@ -1,5 +1,7 @@
 """The bench domain: every need and every effect at least once, its processes, its scenarios."""
 
+from typing import Any
+
 import pytest
 from bench_scenes import BENCH, bench
 
@@ -162,25 +164,27 @@ DONE = [
 ]  # fmt: skip
 
 
-def _state(*specs, **kwargs) -> State:
+def _state(*specs: str, **kwargs: Any) -> State:
     return State.from_graph(bench(*specs, **kwargs).truth(), BENCH)
 
 
 @pytest.mark.parametrize(("step", "words", "scene"), REFUSED)
-def test_a_need_that_fails_is_refused_in_its_own_words(step, words, scene):
+def test_a_need_that_fails_is_refused_in_its_own_words(
+    step: str, words: str, scene: list[str]
+) -> None:
     answer = bench(*scene).execute(Subtask.parse(step))
     assert answer.status is SkillStatus.REFUSED
     assert words in answer.reason
 
 
 @pytest.mark.parametrize(("step", "scene", "facts"), DONE)
-def test_a_skill_brings_about_what_it_says(step, scene, facts):
+def test_a_skill_brings_about_what_it_says(step: str, scene: list[str], facts: list[str]) -> None:
     after = apply(_state(*scene), Subtask.parse(step))
     assert isinstance(after, State), after
     assert [f for f in facts if not after.holds(Literal.parse(f))] == []
 
 
-def test_a_stripped_nut_is_neither_screwed_on_again_nor_tightened():
+def test_a_stripped_nut_is_neither_screwed_on_again_nor_tightened() -> None:
     world = bench(DRIVER, IN_HOLE, "Nut-1@Bolt-1 torque=tight", "Jaws-1@ToolChanger-1")
     steps = ("tighten(Nut)", "tighten(Nut)", "loosen(Nut)", "change_tool(Jaws)", "pick(Nut)")
     reasons = [world.execute(Subtask.parse(s)).reason for s in (*steps, "screw(Nut, Bolt)")]
@@ -189,7 +193,7 @@ def test_a_stripped_nut_is_neither_screwed_on_again_nor_tightened():
     assert {str(f) for f in world.history()} == {"stripped(Nut-1)", "stripped(Bolt-1)"}
 
 
-def test_a_bench_without_an_arm_changes_no_tool():
+def test_a_bench_without_an_arm_changes_no_tool() -> None:
     world = bench("Screwdriver-1@ToolChanger-1", without="Arm")
     assert "no arm" in world.execute(Subtask.parse("change_tool(Screwdriver)")).reason
 
@@ -213,7 +217,7 @@ STRIPPED = {
 """Tried above: only what happened before can make them fail."""
 
 
-def test_no_need_of_the_domain_is_left_out():
+def test_no_need_of_the_domain_is_left_out() -> None:
     tried = set(STRIPPED)
     for step, _, scene in REFUSED:
         subtask, state = Subtask.parse(step), _state(*scene)
@@ -225,7 +229,7 @@ def test_no_need_of_the_domain_is_left_out():
     assert wanted - tried == set()
 
 
-def test_no_effect_and_no_process_of_the_domain_is_left_out():
+def test_no_effect_and_no_process_of_the_domain_is_left_out() -> None:
     tried, wanted = set(), set()
     for step, scene, _ in DONE:
         subtask, state = Subtask.parse(step), _state(*scene)
@@ -240,7 +244,7 @@ def test_no_effect_and_no_process_of_the_domain_is_left_out():
     assert {p.name for p in BENCH.processes} == {"cure", "pick_up_dirt"}  # both stand in DONE
 
 
-def test_torque_is_read_off_in_newton_metres():
+def test_torque_is_read_off_in_newton_metres() -> None:
     torque = BENCH.attributes["torque"]
     assert [torque.binned(x) for x in (0.0, 1.9, 2.0, 9.5, 40.0)] == [
         "loose", "loose", "snug", "tight", "overtight",

@@ -1,6 +1,10 @@
+# mypy: disable-error-code="operator, union-attr"
 """The bench from demonstrations to the corrected plan and its page, in symbolic worlds."""
 
+from collections.abc import Callable, Sequence
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +21,8 @@ from forestall.records.record import read_record, write_record
 from forestall.report.page import page_html
 from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
 from forestall.testing.symbolic_scene import start_scene
-from forestall.types.episode import EpisodeEnd, SkillStatus
+from forestall.types.demonstration import Demonstration
+from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
 from forestall.types.verdict import Decision, ReplanOutcome
 
 SYMBOLIC = Given.named({"world": "symbolic", "perceiver": "given-graph"})
@@ -30,13 +35,16 @@ SCENARIOS = {
 }
 """Scenario → how its cause begins."""
 
+Memory = Callable[[str], Sequence[Demonstration]]
+"""Task → its demonstrations."""
+
 
 @pytest.fixture(scope="module")
-def memory(tmp_path_factory):
+def memory(tmp_path_factory: pytest.TempPathFactory) -> Memory:
     folder = tmp_path_factory.mktemp("memory")
 
     @cache
-    def of(task):
+    def of(task: str) -> Sequence[Demonstration]:
         with open_store(folder / f"{task}.db", create=True) as store:
             for k in range(4):
                 store.add(record_one(RecordingJob(task, DEMONSTRATION_SEEDS + 10 * k, SYMBOLIC)))
@@ -45,12 +53,18 @@ def memory(tmp_path_factory):
     return of
 
 
-def _run(memory, task, scenario=None, strategy="proactive", seed=3):
+def _run(
+    memory: Memory,
+    task: str,
+    scenario: str | None = None,
+    strategy: str = "proactive",
+    seed: int = 3,
+) -> EpisodeRecord:
     config = run_config(task, scenario=scenario, seed=seed, given=SYMBOLIC, strategy=strategy)
     return run_episode(prepare(config), memory(task))
 
 
-def test_its_files_are_found_by_name():
+def test_its_files_are_found_by_name() -> None:
     assert task_names("bench") == TASKS
     assert set(SCENARIOS) == set(scenario_names(domain="bench"))
     for name in SCENARIOS:
@@ -62,7 +76,7 @@ def test_its_files_are_found_by_name():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_an_undisturbed_run_is_let_alone(memory, task):
+def test_an_undisturbed_run_is_let_alone(memory: Memory, task: str) -> None:
     for seed in range(3):
         record = _run(memory, task, seed=seed)
         assert record.success, record.failures
@@ -70,15 +84,15 @@ def test_an_undisturbed_run_is_let_alone(memory, task):
 
 
 @pytest.mark.parametrize("task", task_names("household"))
-def test_the_tasks_of_the_household_run_in_a_symbolic_world(task):
+def test_the_tasks_of_the_household_run_in_a_symbolic_world(task: str) -> None:
     for seed in range(3):
         config = run_config(task, seed=seed, given=SYMBOLIC, strategy="none")
         record = run_episode(prepare(config), None)
         assert record.success, record.failures
 
 
-def test_a_run_in_the_bench_has_its_own_parts_unless_others_are_said():
-    def names(**named):
+def test_a_run_in_the_bench_has_its_own_parts_unless_others_are_said() -> None:
+    def names(**named: Any) -> dict[str, str]:
         return {c.kind: c.name for c in run_config("glue-peg", **named).choices}
 
     assert (names()["world"], names()["perceiver"]) == ("symbolic", "given-graph")
@@ -86,14 +100,14 @@ def test_a_run_in_the_bench_has_its_own_parts_unless_others_are_said():
     assert {c.kind: c.name for c in run_config("make-coffee").choices}["world"] == "kitchen"
 
 
-def test_pictures_are_asked_for_in_a_sentence():
+def test_pictures_are_asked_for_in_a_sentence() -> None:
     config = run_config("glue-peg", perceiver="graph", strategy="none")
     record = run_episode(prepare(config), None)
     assert "use the perceiver given-graph" in record.failures[0]
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_without_a_warning_the_scenario_fails_where_it_says(memory, name):
+def test_without_a_warning_the_scenario_fails_where_it_says(memory: Memory, name: str) -> None:
     scenario = load_scenario(name)
     record = _run(memory, scenario.task, name, strategy="none")
     assert record.success is False
@@ -104,7 +118,9 @@ def test_without_a_warning_the_scenario_fails_where_it_says(memory, name):
 
 
 @pytest.mark.parametrize(("name", "cause"), SCENARIOS.items())
-def test_the_alarm_comes_in_time_with_its_cause_and_a_plan_that_works(memory, name, cause):
+def test_the_alarm_comes_in_time_with_its_cause_and_a_plan_that_works(
+    memory: Memory, name: str, cause: str
+) -> None:
     scenario = load_scenario(name)
     record = _run(memory, scenario.task, name)
     _, effect = scenario.moments(record.initial_plan)
@@ -118,7 +134,7 @@ def test_the_alarm_comes_in_time_with_its_cause_and_a_plan_that_works(memory, na
     assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in record.executed)
 
 
-def test_a_plan_knows_what_its_needs_stand_on_and_leaves_the_floor_alone():
+def test_a_plan_knows_what_its_needs_stand_on_and_leaves_the_floor_alone() -> None:
     """The arm and its jaws are no part of the goal, and every step needs them."""
     loaded = load_task("glue-peg")
     graph = start_scene(loaded.domain, loaded.task.scene, 3)
@@ -127,7 +143,7 @@ def test_a_plan_knows_what_its_needs_stand_on_and_leaves_the_floor_alone():
     assert not any("Floor" in a for step in planned.subtasks for a in step.args)
 
 
-def test_tools_are_changed_in_a_narrowed_problem():
+def test_tools_are_changed_in_a_narrowed_problem() -> None:
     loaded = load_task("fasten-plate")
     state = State.from_graph(start_scene(loaded.domain, loaded.task.scene, 3), loaded.domain)
     goals = alternatives(state, loaded.task.goal)
@@ -136,7 +152,7 @@ def test_tools_are_changed_in_a_narrowed_problem():
     assert "change_tool(Screwdriver-1)" in map(str, planned.subtasks)
 
 
-def test_watching_says_the_same_and_lets_the_thread_be_stripped(memory):
+def test_watching_says_the_same_and_lets_the_thread_be_stripped(memory: Memory) -> None:
     name = "irreversible-fasten-plate-1-thread"
     record = _run(memory, "fasten-plate", name, strategy="watch")
     assert record.boundaries[0].diagnosis.cause.startswith(SCENARIOS[name])
@@ -146,7 +162,7 @@ def test_watching_says_the_same_and_lets_the_thread_be_stripped(memory):
     }
 
 
-def test_a_run_without_pictures_has_a_page_and_reads_back(memory, tmp_path):
+def test_a_run_without_pictures_has_a_page_and_reads_back(memory: Memory, tmp_path: Path) -> None:
     record = _run(memory, "glue-peg", "hole-occupied")
     html = page_html(record)
     assert SCENARIOS["hole-occupied"] in html
@@ -157,7 +173,9 @@ def test_a_run_without_pictures_has_a_page_and_reads_back(memory, tmp_path):
     assert page_html(again, tmp_path / "run") == html
 
 
-def test_the_command_line_needs_to_be_told_nothing_else(tmp_path, monkeypatch, capsys):
+def test_the_command_line_needs_to_be_told_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setenv("FORESTALL_CACHE", str(tmp_path / "cache"))
     out = tmp_path / "run"
     args = ["run", "hand-over-washer", "--scenario", "tray-full", "--quiet", "--out", str(out)]

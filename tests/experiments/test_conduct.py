@@ -20,7 +20,8 @@ from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
 from forestall.statistics.cases import CASE_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
 
-SMALL = Experiment(Choice("proactive", "development", limit=2), workers=2)
+CHOICE = Choice("proactive", "development", limit=2)
+SMALL = Experiment(CHOICE, workers=2)
 
 
 def quiet(done: int, total: int, what: str) -> None:
@@ -88,7 +89,7 @@ def test_the_unmonitored_run_of_a_case_comes_first_within_its_scene() -> None:
 def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
     whole = play(SMALL, tmp_path / "whole")
     lines = (tmp_path / "whole" / ROWS).read_text().splitlines(keepends=True)
-    assert len(lines) == len(whole) == len(runs_for(SMALL.choice))
+    assert len(lines) == len(whole) == len(runs_for(CHOICE))
     half = tmp_path / "half"
     half.mkdir()
     (half / ABOUT).write_bytes((tmp_path / "whole" / ABOUT).read_bytes())
@@ -107,7 +108,7 @@ def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_path: Path) -> None:
     rows = play(replace(SMALL, workers=1), tmp_path, deadly_row)
     broken = [r for r in rows if r.end == "error"]
-    assert len(rows) == len(runs_for(SMALL.choice))
+    assert len(rows) == len(runs_for(CHOICE))
     assert {r.task for r in broken} == {DEADLY}
     assert all("died" in r.error and not r.success for r in broken)
 
@@ -135,7 +136,7 @@ def test_reading_while_another_writes_takes_nothing_away(tmp_path: Path) -> None
     with (tmp_path / ROWS).open("a") as lines:
         lines.write('{"format": 1, "set"')
     before = (tmp_path / ROWS).read_bytes()
-    assert len(episodes_in(tmp_path).rows()) == len(runs_for(SMALL.choice))
+    assert len(episodes_in(tmp_path).rows()) == len(runs_for(CHOICE))
     assert (tmp_path / ROWS).read_bytes() == before
 
 
@@ -185,7 +186,7 @@ def test_a_full_disk_is_said_and_what_was_finished_is_kept(
 
     real, calls = ResultsFolder.add, []
 
-    def add(self: ResultsFolder, lines: IO[str], row: EpisodeRow) -> None:
+    def add(self: ResultsFolder[EpisodeRow], lines: IO[str], row: EpisodeRow) -> None:
         calls.append(row)
         real(self, Full() if len(calls) == 3 else lines, row)
 

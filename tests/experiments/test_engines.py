@@ -1,3 +1,4 @@
+# mypy: disable-error-code="index, misc"
 """Workers: groups stay together, the dead are replaced, nothing is lost."""
 
 from __future__ import annotations

@@ -19,8 +19,9 @@ from forestall.experiments.worker import Work
 from forestall.statistics.cases import Case
 from forestall.statistics.rows import EpisodeRow
 
+EPISODES = Episodes(("toast-bread",), ("knife-blocked",), ("none",), (1, 2))
 TOAST = Experiment(
-    Episodes(("toast-bread",), ("knife-blocked",), ("none",), (1, 2)),
+    EPISODES,
     settings=Settings(pages="none"),
     kind=KIND,
     engine="inline",
@@ -57,7 +58,7 @@ def test_finished_episodes_are_not_run_again_and_others_join_them(tmp_path: Path
     before = (tmp_path / ROWS).read_text()
     assert play(TOAST, tmp_path) == first
     assert (tmp_path / ROWS).read_text() == before
-    more = replace(TOAST, choice=replace(TOAST.choice, seeds=(2, 3)))
+    more = replace(TOAST, choice=replace(EPISODES, seeds=(2, 3)))
     assert len(play(more, tmp_path)) == 4
     assert len((tmp_path / ROWS).read_text().splitlines()) == 6
 

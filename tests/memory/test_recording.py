@@ -60,7 +60,9 @@ def record() -> EpisodeRecord:
 
 def grey(boundary: BoundaryRecord) -> View | None:
     assert boundary.observation is not None
-    return View(caption=f"grey {boundary.observation.frames[-1].rgb[0, 0, 0]}", captioner="grey")
+    frame = boundary.observation.frames[-1]
+    assert isinstance(frame, Frame)
+    return View(caption=f"grey {frame.rgb[0, 0, 0]}", captioner="grey")
 
 
 def test_steps_views_and_the_last_look() -> None:

@@ -366,7 +366,7 @@ def test_missing_damaged_and_misnamed_pictures(path: Path) -> None:
         with pytest.raises(MemoryFileError, match="not the name of a stored picture"):
             store.get_image("../../etc/passwd")
         with pytest.raises(InputError, match="uint8"):
-            store.put_image(np.zeros((2, 2, 3), np.float32))  # type: ignore[arg-type]
+            store.put_image(np.zeros((2, 2, 3), np.float32))
         one, two = (store.put_image(picture(i)) for i in range(2))
         files = {p.stem: p for p in store.images.folder.rglob("*.png")}
         files[one].write_bytes(files[two].read_bytes())

@@ -22,9 +22,8 @@ class Solid:
     round: bool = False
 
     def moved(self, offset: Sequence[float]) -> Solid:
-        low = tuple(float(a + b) for a, b in zip(self.low, offset, strict=True))
-        high = tuple(float(a + b) for a, b in zip(self.high, offset, strict=True))
-        return replace(self, low=low, high=high)
+        (x, y, z), (to_x, to_y, to_z), (dx, dy, dz) = self.low, self.high, offset
+        return replace(self, low=(x + dx, y + dy, z + dz), high=(to_x + dx, to_y + dy, to_z + dz))
 
 
 def at(

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "o"
 
 
-def edit(folder: Path, change: Callable[[dict], None]) -> None:
+def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
     file = folder / "observation.json"
     data = json.loads(file.read_text())
     change(data)
@@ -93,7 +94,7 @@ def test_depth_png_is_millimetres(folder: Path) -> None:
 
 
 def test_unnamed_detections_are_numbered(folder: Path) -> None:
-    def change(data: dict) -> None:
+    def change(data: dict[str, Any]) -> None:
         for d in data["frames"][0]["detections"]:
             d.pop("instance")
 
@@ -104,7 +105,7 @@ def test_unnamed_detections_are_numbered(folder: Path) -> None:
     assert states == STATES
 
 
-def detection(data: dict, number: int = 1) -> dict:
+def detection(data: dict[str, Any], number: int = 1) -> Any:
     return data["frames"][0]["detections"][number]
 
 
@@ -172,7 +173,7 @@ def filled(value: float) -> Callable[[np.ndarray], np.ndarray]:
     return change
 
 
-DEPTH_FAULTS = {
+DEPTH_FAULTS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "nan": (filled(np.nan), "1 NaN"),
     "infinite": (filled(np.inf), "infinite"),
     "negative": (filled(-1.0), "negative"),
@@ -246,7 +247,7 @@ def test_a_frame_with_depth_that_is_not_a_number_cannot_be_made() -> None:
 
 
 def test_two_detections_may_not_share_a_mask(folder: Path) -> None:
-    def change(data: dict) -> None:
+    def change(data: dict[str, Any]) -> None:
         first, second = data["frames"][0]["detections"][:2]
         second["id"] = first["id"]
 

@@ -172,7 +172,7 @@ def test_moving_the_world_changes_no_relation(
 
 
 def test_moving_the_world_moves_the_graph() -> None:
-    shift = np.array([2.0, -1.0, 0.24])
+    shift = (2.0, -1.0, 0.24)
     pose = EYE.copy()
     pose[:3, 3] += shift
     graphs = []

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from forestall.domain.load import shipped
@@ -17,7 +20,13 @@ COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
 MUG = (0.085, 0.085, 0.10)
 
 
-def graph_of(solids, *poses, states=None, holding=None, hand=(0.0, -0.5, 1.2)) -> SceneGraph:
+def graph_of(
+    solids: Sequence[Solid],
+    *poses: npt.NDArray[np.float64],
+    states: Mapping[str, Mapping[str, str]] | None = None,
+    holding: str | None = None,
+    hand: tuple[float, float, float] = (0.0, -0.5, 1.2),
+) -> SceneGraph:
     perceiver = GraphPerceiver(
         InstanceSegmenter(), GivenStateEstimator(states or {}), shipped("household")
     )
@@ -32,7 +41,7 @@ def parents(graph: SceneGraph) -> dict[str, tuple[str, str]]:
     }
 
 
-def microwave(**kwargs) -> list[Solid]:
+def microwave() -> list[Solid]:
     return hollow("Microwave-1", (-0.25, 0.2, 0.9), (0.25, 0.58, 1.2), 0.02, "front")
 
 

@@ -42,7 +42,7 @@ def seen(state: State) -> SceneGraph:
     for name in visible:
         values = tuple((a, v) for (n, a), v in state.values.items() if n == name)
         box = None if name in state.lost else _BOX
-        nodes.append(ObjectNode(name, state.kinds[name], values, box and box.centre, box))
+        nodes.append(ObjectNode(name, state.kinds[name], values, _BOX.centre if box else None, box))
     relations = [Relation(n, p.relation, p.parent) for n in visible if (p := state.place(n))]
     if state.held is not None:
         relations.append(Relation(state.held, "held_by", GRIPPER))

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from forestall.planning.driving import with_driving
 from forestall.planning.goals import alternatives
 from forestall.planning.pddl import GOAL, Pddl, export
-from forestall.planning.planner import pose, with_driving
+from forestall.planning.planner import pose
 from forestall.planning.problem import Problem
 from forestall.planning.search import SearchOutcome, solve
 from forestall.planning.state import State

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,6 +38,7 @@ from forestall.types.verdict import (
     Diagnosis,
     Discrepancy,
     PlanCheck,
+    Reference,
     Replan,
     ReplanOutcome,
     ScoreParts,
@@ -74,8 +76,10 @@ KEYS = {
 }
 
 
-def as_json(record: EpisodeRecord) -> dict[str, object]:
-    return json.loads(json.dumps(record_to_json(record, page="p.html"), allow_nan=False))
+def as_json(record: EpisodeRecord) -> dict[str, Any]:
+    text = json.dumps(record_to_json(record, page="p.html"), allow_nan=False)
+    read: dict[str, Any] = json.loads(text)
+    return read
 
 
 def test_every_key_is_there_with_its_type() -> None:
@@ -264,7 +268,7 @@ GRAPHS = st.sampled_from(
 )
 VIEWS = st.builds(View, st.none() | st.binary(max_size=6), WORDS, WORDS, WORDS)
 REFERENCES = st.builds(
-    records.Reference,
+    Reference,
     WORDS,
     WORDS,
     st.integers(0, 9),

@@ -9,6 +9,7 @@ from rich.console import Console
 from forestall.records.listeners import ProgressLine
 from forestall.types.decision import Outcome
 from forestall.types.episode import EpisodeRecord, ExecutedRecord, SkillOutcome, SkillStatus
+from forestall.types.plan import Subtask
 from report import records
 
 
@@ -61,7 +62,7 @@ def test_names_are_not_read_as_markup_and_failures_are_said() -> None:
     text = written(record)
     assert 'failed: dropped "it" <hard>' in text
     assert "heat-potato not scored: stopped safely" in text
-    odd = records.Subtask("pick_up", ("[red]Mug[/red]",))
+    odd = Subtask("pick_up", ("[red]Mug[/red]",))
     file = io.StringIO()
     line = ProgressLine(Console(file=file, width=100), clock=Clock())
     line.on_start(records.begun(record))

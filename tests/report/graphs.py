@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.plan import Subtask
@@ -26,19 +28,19 @@ def relations(*texts: str) -> tuple[Relation, ...]:
     return tuple(Relation(*text.split()) for text in texts)
 
 
-def plate(**states: str | None) -> ObjectNode:
+def plate(**states: Any) -> ObjectNode:
     return node(
         "Plate-1", **({"dirty": "clean", "broken": "intact", "temperature": "room"} | states)
     )
 
 
-def potato(**states: str | None) -> ObjectNode:
+def potato(**states: Any) -> ObjectNode:
     return node(
         "Potato-1", **({"sliced": "whole", "cooked": "raw", "temperature": "room"} | states)
     )
 
 
-def microwave(**states: str | None) -> ObjectNode:
+def microwave(**states: Any) -> ObjectNode:
     return node("Microwave-1", **({"open": "open", "toggled": "off"} | states))
 
 

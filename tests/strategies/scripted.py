@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,24 +64,26 @@ class Parts:
         self.plans: list[Plan] = []
         self.domain = shipped("household")
 
-    def retrieve(self, subtask, task, done):  # type: ignore[no-untyped-def]
+    def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
         return REFERENCES
 
-    def judge(self, observed, observation, references):  # type: ignore[no-untyped-def]
+    def judge(
+        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
+    ) -> Verdict:
         self.judged.append(tuple(references))
         return Verdict(self.decision, "scripted", 0.5, 0.9, Calibration.FIXED)
 
-    def diagnose(self, context, verdict):  # type: ignore[no-untyped-def]
+    def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         self.asked.append(context)
         facts = self.was_so if context.when is When.BEFORE else self.must_change
         return Diagnosis("the microwave is closed", facts or self.must_change)
 
-    def replan(self, context, diagnosis):  # type: ignore[no-untyped-def]
+    def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
         self.replanned += 1
         self.replanned_at = context.index
         return self.answer
 
-    def check(self, plan, graph, goal):  # type: ignore[no-untyped-def]
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
         self.plans.append(plan)
         unmet = () if self.rest_runs else (HOT,)
         return PlanCheck(self.rest_runs, reason="the microwave is closed", unmet=unmet)

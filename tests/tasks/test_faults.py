@@ -1,12 +1,16 @@
+from collections.abc import Sequence
+
 import pytest
 from pydantic import BaseModel, ValidationError
 
 from forestall.domain.load import shipped
 from forestall.errors import InputError, UnknownNameError
+from forestall.seams import Environment
 from forestall.tasks import faults as f
-from forestall.types.episode import SkillStatus
+from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
+from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
 DOMAIN = shipped("household")
@@ -19,18 +23,18 @@ PLAN = Plan.parse(
 )
 
 
-def _scene(**table):
+def _scene(**table: object) -> SceneNeeds:
     return f.apply_scene_faults(NEEDS, [f.parse_fault(table)], DOMAIN)
 
 
-def _plan(**table):
+def _plan(**table: object) -> list[str]:
     return f.apply_plan_faults(PLAN, [f.parse_fault(table)], DOMAIN).texts()
 
 
 # scene
 
 
-def test_add_object_takes_the_next_free_number_and_its_states():
+def test_add_object_takes_the_next_free_number_and_its_states() -> None:
     needs = _scene(
         kind="add_object", category="Mug", places=["SinkBasin"], states={"dirty": "dirty"}
     )
@@ -38,12 +42,12 @@ def test_add_object_takes_the_next_free_number_and_its_states():
     assert NEEDS.objects == needs.objects[:-1]
 
 
-def test_add_object_in_front_of_a_category_means_the_object_of_the_task():
+def test_add_object_in_front_of_a_category_means_the_object_of_the_task() -> None:
     needs = _scene(kind="add_object", category="Pan", in_front_of="Mug")
     assert needs.objects[-1].in_front_of == "Mug-1"
 
 
-def test_set_state_of_an_object_and_of_a_fixture():
+def test_set_state_of_an_object_and_of_a_fixture() -> None:
     assert _scene(kind="set_state", object="Mug", attribute="filled", value="wine").objects[
         0
     ].states == (("filled", "wine"),)
@@ -53,13 +57,13 @@ def test_set_state_of_an_object_and_of_a_fixture():
     assert ("StoveBurner-4", "toggled", "on") in needs.fixtures
 
 
-def test_move_and_remove():
+def test_move_and_remove() -> None:
     needs = _scene(kind="move_object", object="Mug-1", places=["CoffeeMachine"])
     assert needs.objects[0].places == ("CoffeeMachine",)
     assert [o.id for o in _scene(kind="remove_object", object="Mug").objects] == ["Pot-1"]
 
 
-def test_scene_faults_compose_in_order():
+def test_scene_faults_compose_in_order() -> None:
     needs = f.apply_scene_faults(
         NEEDS,
         [
@@ -103,7 +107,9 @@ def test_scene_faults_compose_in_order():
         ({"kind": "remove_object", "object": "Cup"}, "remove_object.object"),
     ],
 )
-def test_a_scene_fault_that_fits_nothing_says_which_field_and_what_would(table, message):
+def test_a_scene_fault_that_fits_nothing_says_which_field_and_what_would(
+    table: dict[str, object], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         _scene(**table)
 
@@ -111,13 +117,13 @@ def test_a_scene_fault_that_fits_nothing_says_which_field_and_what_would(table, 
 # plan
 
 
-def test_drop_step_by_occurrence():
+def test_drop_step_by_occurrence() -> None:
     assert _plan(kind="drop_step", step="pick_up(Mug)", occurrence=2) == [
         "navigate_to_obj(Mug)", "pick_up(Mug)", "put_in(Mug, Sink)", "pour(Mug, Sink)"
     ]  # fmt: skip
 
 
-def test_insert_and_move_step():
+def test_insert_and_move_step() -> None:
     assert _plan(kind="insert_step", step="toggle_on(Faucet)", after="put_in(Mug, Sink)")[3] == (
         "toggle_on(Faucet)"
     )
@@ -129,7 +135,7 @@ def test_insert_and_move_step():
     )
 
 
-def test_replace_argument_and_plan():
+def test_replace_argument_and_plan() -> None:
     assert _plan(kind="replace_argument", step="put_in(Mug, Sink)", argument="target", by="Bowl")[
         2
     ] == ("put_in(Mug, Bowl)")
@@ -160,7 +166,9 @@ def test_replace_argument_and_plan():
         ),
     ],
 )
-def test_a_plan_fault_that_fits_nothing_says_which_field_and_what_would(table, message):
+def test_a_plan_fault_that_fits_nothing_says_which_field_and_what_would(
+    table: dict[str, object], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         _plan(**table)
 
@@ -179,14 +187,16 @@ def test_a_plan_fault_that_fits_nothing_says_which_field_and_what_would(table, m
         ({"kind": "drop", "step": "grab(Mug)"}, "unknown skill 'grab'"),
     ],
 )
-def test_a_skill_that_the_domain_does_not_have_is_named_when_the_steps_are_checked(table, message):
+def test_a_skill_that_the_domain_does_not_have_is_named_when_the_steps_are_checked(
+    table: dict[str, object], message: str
+) -> None:
     fault = f.parse_fault(table)
     plan = f.apply_plan_faults(PLAN, [fault], DOMAIN)
     with pytest.raises(InputError, match=message):
         f.check_steps(plan, [fault], DOMAIN)
 
 
-def test_faults_embed_in_a_file_schema():
+def test_faults_embed_in_a_file_schema() -> None:
     class File(BaseModel):
         faults: list[f.Fault]
 
@@ -201,14 +211,16 @@ def test_faults_embed_in_a_file_schema():
 # execution
 
 
-def _run(*tables, steps):
+def _run(
+    *tables: dict[str, object], steps: Sequence[str]
+) -> tuple[KitchenEnvironment, Environment, list[SkillOutcome]]:
     inner = flat_environment(NEEDS, DOMAIN)
     env = f.wrap(inner, [f.parse_fault(t) for t in tables], inner, DOMAIN)
     env.reset(0)
     return inner, env, [env.execute(Subtask.parse(s)) for s in steps]
 
 
-def test_without_execution_faults_the_environment_is_not_wrapped():
+def test_without_execution_faults_the_environment_is_not_wrapped() -> None:
     inner = flat_environment(NEEDS, DOMAIN)
     assert (
         f.wrap(inner, [f.parse_fault({"kind": "remove_object", "object": "Mug"})], inner, DOMAIN)
@@ -216,7 +228,7 @@ def test_without_execution_faults_the_environment_is_not_wrapped():
     )
 
 
-def test_drop_runs_the_skill_and_then_loses_the_object_once():
+def test_drop_runs_the_skill_and_then_loses_the_object_once() -> None:
     steps = ["pick_up(Mug)", "navigate_to_obj(Sink-1)"]
     inner, env, outcomes = _run({"kind": "drop", "step": "navigate_to_obj(Sink)"}, steps=steps)
     assert outcomes[-1].status is SkillStatus.SUCCEEDED
@@ -228,7 +240,7 @@ def test_drop_runs_the_skill_and_then_loses_the_object_once():
     assert inner.oracle.truth().holding == "Mug-1"
 
 
-def test_drop_waits_for_a_full_hand():
+def test_drop_waits_for_a_full_hand() -> None:
     inner, _, _ = _run(
         {"kind": "drop", "step": "navigate_to_obj(Sink)"},
         steps=["navigate_to_obj(Sink)", "pick_up(Mug)", "navigate_to_obj(SinkBasin)"],
@@ -236,7 +248,7 @@ def test_drop_waits_for_a_full_hand():
     assert inner.oracle.truth().holding is None
 
 
-def test_failed_action_does_nothing_and_reports_success_once():
+def test_failed_action_does_nothing_and_reports_success_once() -> None:
     inner, env, outcomes = _run(
         {"kind": "failed_action", "step": "toggle_on(Faucet)"}, steps=["toggle_on(Faucet-1)"]
     )
@@ -247,7 +259,7 @@ def test_failed_action_does_nothing_and_reports_success_once():
     assert inner.oracle.states("Faucet-1")["toggled"] == "on"
 
 
-def test_occurrence_and_times():
+def test_occurrence_and_times() -> None:
     fault = {"kind": "failed_action", "step": "toggle_on(Faucet)", "occurrence": 2, "times": 2}
     steps = ["toggle_on(Faucet)", "toggle_off(Faucet)"]
     inner, env, _ = _run(fault, steps=steps)
@@ -256,7 +268,7 @@ def test_occurrence_and_times():
         assert inner.oracle.states("Faucet-1")["toggled"] == expected
 
 
-def test_wrong_object_and_wrong_receptacle():
+def test_wrong_object_and_wrong_receptacle() -> None:
     inner, _, _ = _run(
         {"kind": "wrong_object", "step": "pick_up(Mug)", "acts_on": "Pot"}, steps=["pick_up(Mug-1)"]
     )
@@ -268,7 +280,7 @@ def test_wrong_object_and_wrong_receptacle():
     assert inner.oracle.truth().parents("Mug-1", DOMAIN.containing) == ("GarbageCan-1",)
 
 
-def test_an_instance_in_a_fault_means_only_that_instance():
+def test_an_instance_in_a_fault_means_only_that_instance() -> None:
     inner, _, _ = _run(
         {"kind": "failed_action", "step": "toggle_on(StoveBurner-2)"},
         steps=["toggle_on(StoveBurner-1)", "toggle_on(StoveBurner-2)"],
@@ -277,7 +289,7 @@ def test_an_instance_in_a_fault_means_only_that_instance():
     assert inner.oracle.states("StoveBurner-2")["toggled"] == "off"
 
 
-def test_reset_arms_the_faults_again_and_the_rest_is_handed_on():
+def test_reset_arms_the_faults_again_and_the_rest_is_handed_on() -> None:
     inner, env, _ = _run(
         {"kind": "failed_action", "step": "toggle_on(Faucet)"}, steps=["toggle_on(Faucet)"]
     )
@@ -289,13 +301,13 @@ def test_reset_arms_the_faults_again_and_the_rest_is_handed_on():
     env.close()
 
 
-def test_errors_of_unknown_names_carry_the_known_ones():
+def test_errors_of_unknown_names_carry_the_known_ones() -> None:
     with pytest.raises(UnknownNameError) as caught:
         _scene(kind="remove_object", object="Mugg")
     assert "Mug" in caught.value.known
 
 
-def test_drop_at_a_placing_step_comes_before_the_hand_lets_go():
+def test_drop_at_a_placing_step_comes_before_the_hand_lets_go() -> None:
     inner, _, outcomes = _run(
         {"kind": "drop", "step": "put_in(Mug, Sink)"}, steps=["pick_up(Mug)", "put_in(Mug, Sink)"]
     )

@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import pytest
@@ -18,25 +19,27 @@ class _Oracle:
     gone_bad: frozenset[str] = frozenset()
     told: tuple[Event, ...] = field(default_factory=tuple)
 
-    def truth(self):
+    def truth(self) -> SceneGraph:
         return self.graph
 
-    def states(self, instance):
+    def states(self, instance: str) -> dict[str, str]:
         node = self.graph.get(instance)
-        return {} if node is None else dict(node.states)
+        return {} if node is None else {a: v for a, v in node.states if v is not None}
 
-    def history(self):
+    def history(self) -> frozenset[Literal]:
         return frozenset(Literal("spoiled", (x,)) for x in self.gone_bad)
 
-    def events(self):
+    def events(self) -> tuple[Event, ...]:
         return self.told
 
 
-def _node(name, **states):
+def _node(name: str, **states: str) -> ObjectNode:
     return ObjectNode(name, name.rpartition("-")[0], tuple(states.items()))
 
 
-def _goal(*literals, never=(), weak=(), **variables):
+def _goal(
+    *literals: str, never: Sequence[str] = (), weak: Sequence[str] = (), **variables: str
+) -> Goal:
     return Goal(
         "",
         tuple((f"?{v}", c) for v, c in variables.items()),
@@ -46,7 +49,9 @@ def _goal(*literals, never=(), weak=(), **variables):
     )
 
 
-def _check(goal, graph, spoiled=(), events=()):
+def _check(
+    goal: Goal, graph: SceneGraph, spoiled: Sequence[str] = (), events: Sequence[Event] = ()
+) -> tuple[bool, bool | None, tuple[str, ...]]:
     oracle = _Oracle(graph, frozenset(spoiled), tuple(events))
     return TruthGoalChecker(DOMAIN).check(goal, oracle)
 
@@ -65,7 +70,7 @@ MUGS = SceneGraph(
 )
 
 
-def test_one_binding_must_fit_all_literals():
+def test_one_binding_must_fit_all_literals() -> None:
     goal = _goal("filled(?m)=coffee", "dirty(?m)=clean", m="Mug")
     assert _check(goal, MUGS) == (True, None, ())
     goal = _goal("filled(?m)=coffee", "dirty(?m)=clean", "on_top_of(?m, CounterTop)", m="Mug")
@@ -74,14 +79,14 @@ def test_one_binding_must_fit_all_literals():
     assert failures == ("dirty(Mug-1)=clean does not hold in the end: it is dirty",)
 
 
-def test_the_weaker_check_stands_beside():
+def test_the_weaker_check_stands_beside() -> None:
     goal = _goal("on_top_of(?m, CounterTop)", "dirty(?m)=clean", weak=["dirty(?m)=clean"], m="Mug")
     assert _check(goal, MUGS)[:2] == (False, True)
     goal = _goal("dirty(?m)=clean", weak=["inside(?m, CounterTop)"], m="Mug")
     assert _check(goal, MUGS)[:2] == (True, False)
 
 
-def test_what_was_spoiled_does_not_count_and_the_reason_is_told():
+def test_what_was_spoiled_does_not_count_and_the_reason_is_told() -> None:
     goal = _goal("filled(?m)=coffee", never=["spoiled(?m)"], m="Mug")
     assert _check(goal, MUGS, ["Mug-1"])[0]
     events = [Event(1.0, "spoiled", ("Mug-2",), "brewed into dirt")]
@@ -95,13 +100,13 @@ def test_what_was_spoiled_does_not_count_and_the_reason_is_told():
     assert failures == ("spoiled(Mug-2) must never be: brewed into dirt",)
 
 
-def test_a_category_in_never_means_any_instance_even_one_that_is_gone():
+def test_a_category_in_never_means_any_instance_even_one_that_is_gone() -> None:
     goal = _goal("dirty(?m)=clean", never=["spoiled(Egg)"], m="Mug")
     assert _check(goal, MUGS)[0]
     assert not _check(goal, MUGS, ["Egg-1"])[0]
 
 
-def test_never_looks_into_the_history():
+def test_never_looks_into_the_history() -> None:
     goal = _goal("dirty(?m)=clean", never=["broken(Plate)=broken", "inside(?m, Fridge)"], m="Mug")
     assert _check(goal, MUGS)[0]
     broke = Event(2.0, "state", ("Plate-3",), "broken(Plate-3)=broken")
@@ -113,7 +118,7 @@ def test_never_looks_into_the_history():
     assert _check(goal, MUGS, (), [other, words])[0]
 
 
-def test_never_looks_at_the_end_state():
+def test_never_looks_at_the_end_state() -> None:
     goal = _goal("filled(?m)=coffee", never=["dirty(?m)=dirty"], m="Mug")
     assert _check(goal, MUGS)[0]  # Mug-2
     goal = _goal("on_top_of(?m, CounterTop)", never=["dirty(?m)=dirty"], m="Mug")
@@ -130,24 +135,24 @@ def test_never_looks_at_the_end_state():
         ("not spoiled(Mug)", True),
     ],
 )
-def test_negative_and_derived_literals(literal, holds):
+def test_negative_and_derived_literals(literal: str, holds: bool) -> None:
     assert _check(_goal(literal), MUGS)[0] is holds
 
 
-def test_two_variables_of_one_category_are_two_things():
+def test_two_variables_of_one_category_are_two_things() -> None:
     goal = _goal("filled(?a)=coffee", "filled(?b)=coffee", a="Mug", b="Mug")
     assert _check(goal, MUGS)[0]
     one = SceneGraph((_node("Mug-1", filled="coffee"),))
     assert _check(goal, one)[2] == ("no binding of the goal's variables is possible",)
 
 
-def test_a_category_that_is_not_there_is_named():
+def test_a_category_that_is_not_there_is_named() -> None:
     strict, _, failures = _check(_goal("cooked(?e)=cooked", e="EggCracked"), MUGS)
     assert not strict
     assert failures[0] == "there is no EggCracked"
 
 
-def test_a_variable_that_only_the_weak_check_uses_does_not_matter_to_the_strict_one():
+def test_a_variable_that_only_the_weak_check_uses_does_not_matter_to_the_strict_one() -> None:
     goal = _goal("dirty(?m)=clean", weak=["open(?f)=closed"], m="Mug", f="Fridge")
     assert _check(goal, MUGS)[:2] == (True, False)
 
@@ -155,17 +160,19 @@ def test_a_variable_that_only_the_weak_check_uses_does_not_matter_to_the_strict_
 # what cannot be undone
 
 
-def _harm(goal, graph, spoiled=(), events=()):
+def _harm(
+    goal: Goal, graph: SceneGraph, spoiled: Sequence[str] = (), events: Sequence[Event] = ()
+) -> tuple[tuple[float, str], ...]:
     return irreversible(goal, _Oracle(graph, frozenset(spoiled), tuple(events)), DOMAIN)
 
 
-def test_nothing_irreversible_has_happened():
+def test_nothing_irreversible_has_happened() -> None:
     goal = _goal("filled(?m)=coffee", never=["spoiled(?m)", "broken(Mug)=broken"], m="Mug")
     assert _harm(goal, MUGS) == ()
     assert _harm(goal, MUGS, ["Egg-1"], [Event(1.0, "spoiled", ("Egg-1",), "it fell")]) == ()
 
 
-def test_a_variable_means_any_instance_of_its_category():
+def test_a_variable_means_any_instance_of_its_category() -> None:
     goal = _goal("filled(?m)=coffee", never=["spoiled(?m)"], m="Mug")
     events = [
         Event(3.0, "spoiled", ("Egg-1",), "another thing"),
@@ -176,7 +183,7 @@ def test_a_variable_means_any_instance_of_its_category():
     assert _harm(goal, MUGS, gone, events) == ((5.0, "brewed into dirt"),)
 
 
-def test_harm_comes_in_the_order_of_time_with_its_first_event():
+def test_harm_comes_in_the_order_of_time_with_its_first_event() -> None:
     goal = _goal(
         "dirty(?m)=clean",
         never=["spoiled(Egg)", "broken(Plate)=broken", "inside(?m, Fridge)"],
@@ -195,7 +202,7 @@ def test_harm_comes_in_the_order_of_time_with_its_first_event():
     )
 
 
-def test_what_was_made_is_so_from_the_moment_when_it_was_made():
+def test_what_was_made_is_so_from_the_moment_when_it_was_made() -> None:
     graph = SceneGraph((_node("AppleSliced-1", sliced="sliced"),))
     goal = _goal("dirty(Mug)=clean", never=["sliced(AppleSliced)=sliced"])
     events = [

@@ -1,14 +1,19 @@
+# mypy: disable-error-code="union-attr"
+from typing import Any
+
 import pytest
 
 from forestall.domain.load import build_domain, shipped
+from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.given_graph import GraphPassthrough
+from forestall.seams import Environment
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.faults import Drop, FailedAction
 from forestall.testing.conformance import check_environment
 from forestall.testing.symbolic_scene import relation_at, start_scene
 from forestall.testing.symbolic_world import SymbolicWorld
-from forestall.types.episode import SkillStatus
+from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation
@@ -62,7 +67,7 @@ SORTING = build_domain(
 )
 
 
-def _run(world, *steps):
+def _run(world: Environment, *steps: str) -> list[SkillOutcome]:
     return [world.execute(Subtask.parse(s)) for s in steps]
 
 
@@ -74,12 +79,14 @@ def _run(world, *steps):
         (SORTING, SceneNeeds(objects=(ObjectNeed("Parcel-1", "Parcel"),)), ("take(Parcel, left)",)),
     ],
 )
-def test_a_symbolic_world_conforms_whatever_its_domain(domain, needs, steps):
+def test_a_symbolic_world_conforms_whatever_its_domain(
+    domain: Domain, needs: SceneNeeds, steps: tuple[str, ...]
+) -> None:
     plan = [Subtask.parse(s) for s in steps]
     assert check_environment(lambda: SymbolicWorld(domain, needs), 3, plan, domain) == []
 
 
-def test_a_skill_takes_its_own_time_and_that_of_driving_there():
+def test_a_skill_takes_its_own_time_and_that_of_driving_there() -> None:
     world = SymbolicWorld(BENCH, BENCH_NEEDS)
     world.reset(1)
     first, second = _run(world, "open_lid(PartsBox)", "pick(Nut)")
@@ -88,7 +95,7 @@ def test_a_skill_takes_its_own_time_and_that_of_driving_there():
     assert world.time_s == first.duration_s + second.duration_s
 
 
-def test_what_is_in_a_shut_container_is_not_in_view_but_is_remembered():
+def test_what_is_in_a_shut_container_is_not_in_view_but_is_remembered() -> None:
     world, perceiver = SymbolicWorld(BENCH, BENCH_NEEDS), GraphPassthrough(BENCH)
     graph = perceiver.perceive(world.scan())
     assert graph.get("Nut-1") is None
@@ -104,13 +111,13 @@ def test_what_is_in_a_shut_container_is_not_in_view_but_is_remembered():
     assert perceiver.perceive(world.observe()).get("Nut-1") is None
 
 
-def test_what_no_camera_sees_is_left_open():
+def test_what_no_camera_sees_is_left_open() -> None:
     world = SymbolicWorld(HOUSEHOLD, KITCHEN_NEEDS)
     assert world.states("Mug-1")["temperature"] == "room"
     assert world.scan().graph.get("Mug-1").state("temperature") is None
 
 
-def test_the_scope_of_a_subtask_keeps_what_concerns_it():
+def test_the_scope_of_a_subtask_keeps_what_concerns_it() -> None:
     world, perceiver = SymbolicWorld(BENCH, BENCH_NEEDS), GraphPassthrough(BENCH)
     _run(world, "pick(Bolt)")
     graph = perceiver.perceive(world.observe())
@@ -121,7 +128,7 @@ def test_the_scope_of_a_subtask_keeps_what_concerns_it():
     assert scoped.holding == "Bolt-1"
 
 
-def test_seeds_vary_where_things_are_and_what_lies_about():
+def test_seeds_vary_where_things_are_and_what_lies_about() -> None:
     places, extras = set(), set()
     for seed in range(8):
         graph = start_scene(BENCH, BENCH_NEEDS, seed)
@@ -132,7 +139,7 @@ def test_seeds_vary_where_things_are_and_what_lies_about():
     assert len(extras) > 1
 
 
-def test_a_further_thing_moves_nothing_else():
+def test_a_further_thing_moves_nothing_else() -> None:
     more = SceneNeeds("bench", (*BENCH_NEEDS.objects, ObjectNeed("Washer-1", "Washer")))
     more = SceneNeeds(more.room, more.objects, clutter=more.clutter, undisturbed=BENCH_NEEDS)
     for seed in range(5):
@@ -141,7 +148,7 @@ def test_a_further_thing_moves_nothing_else():
         assert set(kept) <= set(before.relations)
 
 
-def test_a_relation_is_what_predicates_or_skills_say():
+def test_a_relation_is_what_predicates_or_skills_say() -> None:
     assert relation_at(BENCH, "Nut-1", "Bolt-1") == "threaded_on"
     assert relation_at(BENCH, "Nut-1", "PartsBox-1") == "lying_in"
     assert relation_at(HOUSEHOLD, "Mug-1", "CounterTop-1") == "on_top_of"
@@ -150,12 +157,12 @@ def test_a_relation_is_what_predicates_or_skills_say():
         relation_at(BENCH, "Nut-1", "Nut-2")
 
 
-def test_a_thing_is_not_put_where_nothing_takes_it():
+def test_a_thing_is_not_put_where_nothing_takes_it() -> None:
     with pytest.raises(InputError, match="Cloth-1 is wanted at PartsBox"):
         start_scene(BENCH, SceneNeeds(objects=(ObjectNeed("Cloth-1", "Cloth", ("PartsBox",)),)), 0)
 
 
-def test_what_is_dropped_lying_on_the_ground():
+def test_what_is_dropped_lying_on_the_ground() -> None:
     world = SymbolicWorld(BENCH, BENCH_NEEDS)
     _run(world, "pick(Bolt)")
     assert world.drop_held() == "Bolt-1"
@@ -163,7 +170,7 @@ def test_what_is_dropped_lying_on_the_ground():
     assert "lying_on(Bolt-1, Floor-1)" in {e.text for e in world.events()}
 
 
-def test_what_is_dropped_where_there_is_no_ground_is_lost():
+def test_what_is_dropped_where_there_is_no_ground_is_lost() -> None:
     world = SymbolicWorld(SORTING, SceneNeeds(objects=(ObjectNeed("Parcel-1", "Parcel"),)))
     world.reset(0)
     assert _run(world, "take(Parcel, left)", "rest()")[1].status is SkillStatus.SUCCEEDED
@@ -172,9 +179,9 @@ def test_what_is_dropped_where_there_is_no_ground_is_lost():
     assert world.truth().get("Parcel-1").box_m is None
 
 
-def test_the_faults_of_scenarios_work_on_it():
+def test_the_faults_of_scenarios_work_on_it() -> None:
     world = SymbolicWorld(BENCH, BENCH_NEEDS)
-    faults = [FailedAction(step="open_lid(PartsBox)"), Drop(step="pick(Bolt)")]
+    faults: list[Any] = [FailedAction(step="open_lid(PartsBox)"), Drop(step="pick(Bolt)")]
     faulty = FaultyEnvironment(world, faults, world, BENCH)
     faulty.reset(0)
     outcomes = _run(faulty, "open_lid(PartsBox)", "pick(Bolt)")
@@ -183,7 +190,7 @@ def test_the_faults_of_scenarios_work_on_it():
     assert faulty.scan().gripper.holding is None
 
 
-def test_histories_and_what_is_made_are_events():
+def test_histories_and_what_is_made_are_events() -> None:
     world = SymbolicWorld(HOUSEHOLD, KITCHEN_NEEDS)
     world.reset(0)
     _run(world, "open_obj(Fridge)", "pick_up(Egg)", "navigate_to_obj(Pan)", "crack_obj(Egg)")
@@ -196,7 +203,7 @@ def test_histories_and_what_is_made_are_events():
     assert "spoiled" in {e.kind for e in world.events()}
 
 
-def test_a_graph_may_start_a_world_and_an_observation_needs_one_or_a_frame():
+def test_a_graph_may_start_a_world_and_an_observation_needs_one_or_a_frame() -> None:
     start = SceneGraph((ObjectNode("Tray-1", "Tray"), ObjectNode("Unheard-1", "Unheard")))
     world = SymbolicWorld(BENCH, start)
     world.reset(9)

@@ -68,7 +68,7 @@ TAGS: Mapping[str, Callable[[Category], bool]] = {
 def _pairs(vocabulary: Catalogue) -> dict[str, set[tuple[str, str]]]:
     """Every static relation as the catalogue has it."""
     every = vocabulary.categories
-    one = {
+    one: dict[str, Callable[[Category], Any]] = {
         "slices_into": lambda c: c.slices_into,
         "cracks_into": lambda c: c.cracks_into,
         "controls": lambda c: c.controls,

@@ -211,7 +211,7 @@ class Coverage:
             self._only_by(f"{skill.name}: need {i}", (), need.formula, need.formula, state, names)
         for i, effect in zip(self._order, effects, strict=True):
             self._effect(f"{skill.name}: effect {i}", skill.effects[i - 1], effect, state, names)
-        _CHANGE(state, effects, names)
+        _CHANGE(state, effects, dict(names))
 
     def _settle(self, state: State) -> None:
         with patch.object(settle, "change", self._process_change):
@@ -232,7 +232,7 @@ class Coverage:
         self._note(f"process {process.name}: runs")
         for i, effect in enumerate(effects, 1):
             self._effect(f"process {process.name}: effect {i}", effect, effect, state, names)
-        _CHANGE(state, effects, names)
+        _CHANGE(state, effects, dict(names))
 
     def _effect(
         self, label: str, original: Effect, effect: Effect, state: State, names: Mapping[str, str]
@@ -312,4 +312,4 @@ def _new(fact: Literal, state: State) -> bool:
 
 
 _RUN, _REFUSED, _CHOOSE = execute._run, execute._refused, execute._choose
-_SPREAD, _CHANGE, _SETTLE = execute._spread, execute.change, execute.settle
+_SPREAD, _CHANGE, _SETTLE = execute._spread, settle.change, settle.settle

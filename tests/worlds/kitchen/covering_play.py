@@ -103,7 +103,7 @@ class Run:
         return Step(before, subtask, after, refused, outcome.reason, truth(self.kitchen))
 
 
-class _Always(dict):
+class _Always(dict[str, int]):
     """So many spots wherever something lies."""
 
     def get(self, key: str, default: Any = None) -> int:

@@ -151,11 +151,11 @@ def mutants(domain: Domain) -> Iterator[Mutant]:
             label = f"{skill.name}: {name}"
             yield Mutant(label, replace(domain, skills=skills), kind, skill.name, later)
     for i, process in enumerate(domain.processes):
-        others = (*domain.processes[:i], *domain.processes[i + 1 :])
-        whole = replace(domain, processes=others)
+        rest = (*domain.processes[:i], *domain.processes[i + 1 :])
+        whole = replace(domain, processes=rest)
         yield Mutant(f"process {process.name}", whole, "process", settling=True)
-        for name, kind, less in _of_process(process):
-            several = (*domain.processes[:i], less, *domain.processes[i + 1 :])
+        for name, kind, slack in _of_process(process):
+            several = (*domain.processes[:i], slack, *domain.processes[i + 1 :])
             label = f"process {process.name}: {name}"
             yield Mutant(label, replace(domain, processes=several), kind, settling=True)
     for predicate in domain.derived.values():
@@ -168,7 +168,7 @@ def mutants(domain: Domain) -> Iterator[Mutant]:
     for predicate in domain.predicates.values():
         for name, value in (("group", None), ("paired", ""), ("lasting", False)):
             if getattr(predicate, name) != value:
-                less_known = replace(predicate, **{name: value})
+                less_known = replace(predicate, **{name: value})  # type: ignore[arg-type]
                 predicates = {**domain.predicates, predicate.name: less_known}
                 yield Mutant(f"{predicate.name}: {name}", replace(domain, predicates=predicates))
 
@@ -185,11 +185,10 @@ def _of_skill(skill: Skill) -> Iterator[tuple[str, str, Skill, bool]]:
     for name, kind, effects in _effects(skill.effects):
         yield name, kind, replace(skill, effects=effects), False
     for i, choice in enumerate(skill.choices):
-        others = (*skill.choices[:i], *skill.choices[i + 1 :])
         for what, less_choice in _choices(choice):
-            several = (*skill.choices[:i], less_choice, *skill.choices[i + 1 :])
+            choices = (*skill.choices[:i], less_choice, *skill.choices[i + 1 :])
             facing = choice.variable.name == skill.at
-            yield f"choice {what}", "part", replace(skill, choices=several), facing
+            yield f"choice {what}", "part", replace(skill, choices=choices), facing
     if skill.done_when is not None:
         yield "done_when", "part", replace(skill, done_when=None), False
         for what, formula in lessened(skill.done_when):
@@ -214,9 +213,9 @@ def _choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
     for field in ("such_that", "only_if"):
         formula = getattr(choice, field)
         if formula != TRUE:
-            yield f"{name} {field}", replace(choice, **{field: TRUE})
+            yield f"{name} {field}", replace(choice, **{field: TRUE})  # type: ignore[arg-type]
         for what, less in lessened(formula):
-            yield f"{name} {field}: {what}", replace(choice, **{field: less})
+            yield f"{name} {field}: {what}", replace(choice, **{field: less})  # type: ignore[arg-type]
 
 
 def _of_process(process: Process) -> Iterator[tuple[str, str, Process]]:
@@ -254,4 +253,4 @@ def _of_effect(effect: Effect) -> Iterator[tuple[str, Effect]]:
         if len(effect.facts) + len(effect.copies) + len(effect.gone) > 1:
             for i, part in enumerate(parts):
                 others = (*parts[:i], *parts[i + 1 :])
-                yield f"{part}", replace(effect, **{field: others})
+                yield f"{part}", replace(effect, **{field: others})  # type: ignore[arg-type]

@@ -18,6 +18,7 @@ from mutants import mutants
 from mutate_domain import survivors
 
 from forestall.domain.load import shipped
+from forestall.types.plan import Subtask
 from forestall.worlds.kitchen.catalogue import shipped_catalogue
 
 DOMAIN = shipped("household")
@@ -33,18 +34,18 @@ def _excluded(case: str) -> str | None:
     return next((why for pattern, why in UNREACHABLE.items() if re.fullmatch(pattern, case)), None)
 
 
-def test_kitchen_and_domain_agree_on_every_recorded_step():
+def test_kitchen_and_domain_agree_on_every_recorded_step() -> None:
     found = [d for steps in _replayed()[1] for s in steps for d in s.differences]
     assert not found, "\n".join(found)
 
 
-def test_every_need_choice_effect_and_process_is_exercised():
+def test_every_need_choice_effect_and_process_is_exercised() -> None:
     coverage, _ = _replayed()
     missing = sorted(c for c in coverage.open if _excluded(c) is None)
     assert not missing, "not covered:\n" + "\n".join(missing)
 
 
-def test_what_is_called_unreachable_is_still_a_case_and_still_not_reached():
+def test_what_is_called_unreachable_is_still_a_case_and_still_not_reached() -> None:
     coverage, _ = _replayed()
     reached = sorted(c for c in coverage.seen if _excluded(c) is not None)
     assert not reached, "reached, though called unreachable:\n" + "\n".join(reached)
@@ -54,10 +55,10 @@ def test_what_is_called_unreachable_is_still_a_case_and_still_not_reached():
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_fresh_walks_agree_and_reach_nothing_that_is_called_unreachable(seed):
+def test_fresh_walks_agree_and_reach_nothing_that_is_called_unreachable(seed: int) -> None:
     rng, coverage = np.random.default_rng((7, seed)), Coverage(DOMAIN)
     run = Run(start(rng, shipped_catalogue()), DOMAIN)
-    agenda = []
+    agenda: list[Subtask] = []
     for _ in range(30):
         agenda = agenda or intended(rng, run.state)
         chosen = agenda.pop(0)
@@ -68,24 +69,24 @@ def test_fresh_walks_agree_and_reach_nothing_that_is_called_unreachable(seed):
 
 
 @pytest.mark.slow
-def test_no_need_effect_or_process_can_be_left_out():
+def test_no_need_effect_or_process_can_be_left_out() -> None:
     whole = [m for m in mutants(DOMAIN) if m.kind != "part"]
     alive = [n for n in survivors(whole, _replayed()[1]) if why_equivalent(n) is None]
     assert not alive, "nobody misses:\n" + "\n".join(alive)
 
 
-def test_equivalent_mutants_are_mutants():
+def test_equivalent_mutants_are_mutants() -> None:
     names = [str(m) for m in mutants(DOMAIN)]
     stale = [p for p in EQUIVALENT if not any(re.fullmatch(p, n) for n in names)]
     assert not stale, f"no mutant is meant by {stale}"
 
 
-def test_categories_are_those_of_the_kitchen():
+def test_categories_are_those_of_the_kitchen() -> None:
     assert list(differences(DOMAIN, shipped_catalogue())) == []
     assert set(TAGS) == set(DOMAIN.tags)
 
 
-def test_no_tag_attribute_default_number_or_static_fact_can_be_left_out():
+def test_no_tag_attribute_default_number_or_static_fact_can_be_left_out() -> None:
     told = {
         str(m): any(True for _ in differences(m.domain, shipped_catalogue()))
         for m in lacking(DOMAIN)

@@ -15,7 +15,7 @@ from forestall.worlds.kitchen.flat_world import flat_environment
 NEEDS = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug"),))
 
 
-def test_scan_turns_once_around_in_time():
+def test_scan_turns_once_around_in_time() -> None:
     env = SmallKitchen().env
     observation = env.scan()
     assert len(observation.frames) == SCAN_FRAMES
@@ -26,7 +26,7 @@ def test_scan_turns_once_around_in_time():
     assert np.allclose(np.abs(np.diff(turns)), 2 * math.pi / SCAN_FRAMES)
 
 
-def test_observe_gives_one_frame_for_each_focus_point_that_points_at_it():
+def test_observe_gives_one_frame_for_each_focus_point_that_points_at_it() -> None:
     env = SmallKitchen().env
     points = [(2.0, 0.5, 1.0), (-3.0, 2.0, 0.4)]
     observation = env.observe(points)
@@ -38,14 +38,14 @@ def test_observe_gives_one_frame_for_each_focus_point_that_points_at_it():
     assert env.time_s == 0.0
 
 
-def test_the_gripper_knows_what_it_holds():
+def test_the_gripper_knows_what_it_holds() -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1")
     assert kitchen.env.observe().gripper.holding is None
     kitchen.do("pick_up(Mug)")
     assert kitchen.env.observe().gripper.holding == "Mug-1"
 
 
-def test_a_second_reset_with_the_same_seed_uses_the_same_world_from_its_start():
+def test_a_second_reset_with_the_same_seed_uses_the_same_world_from_its_start() -> None:
     env = flat_environment(NEEDS, shipped("household"))
     env.reset(4)
     start = env.oracle.truth()
@@ -60,12 +60,12 @@ def test_a_second_reset_with_the_same_seed_uses_the_same_world_from_its_start():
     assert env._world is not world
 
 
-def test_before_reset_there_is_a_clear_error():
+def test_before_reset_there_is_a_clear_error() -> None:
     with pytest.raises(ForestallError, match="call reset"):
         KitchenEnvironment(NEEDS, shipped("household")).observe()
 
 
-def test_closing_and_resetting_again_works():
+def test_closing_and_resetting_again_works() -> None:
     env = flat_environment(NEEDS, shipped("household"))
     env.reset(1)
     env.close()
@@ -75,13 +75,13 @@ def test_closing_and_resetting_again_works():
     assert env.oracle.truth().get("Mug-1") is not None
 
 
-def test_a_scene_that_cannot_be_built_is_a_scene_error():
+def test_a_scene_that_cannot_be_built_is_a_scene_error() -> None:
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug", ("Toaster",)),))
     with pytest.raises(SceneError, match="Mug-1"):
         flat_environment(needs, shipped("household")).reset(0)
 
 
-def test_a_running_device_works_from_the_start():
+def test_a_running_device_works_from_the_start() -> None:
     needs = SceneNeeds(
         objects=(ObjectNeed("Mug-1", "Mug", ("Sink",)),), fixtures=(("Faucet-1", "toggled", "on"),)
     )
@@ -90,7 +90,7 @@ def test_a_running_device_works_from_the_start():
     assert env.oracle.states("Mug-1")["filled"] == "water"
 
 
-def test_a_new_category_from_a_task_file_follows_the_same_rules():
+def test_a_new_category_from_a_task_file_follows_the_same_rules() -> None:
     teapot = {"tags": ["pickupable"], "attributes": ["filled", "dirty"], "words": "teapot"}
     domain = extend(shipped("household"), {"Teapot": teapot}, {})
     env = flat_environment(SceneNeeds(objects=(ObjectNeed("Teapot-1", "Teapot"),)), domain)

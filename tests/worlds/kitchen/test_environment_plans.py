@@ -3,6 +3,7 @@
 import pytest
 
 from forestall.domain.load import shipped
+from forestall.seams import Environment
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.tasks.files import load_scenario, load_task, scenario_names
 from forestall.tasks.goals import TruthGoalChecker
@@ -79,11 +80,11 @@ PLANS = {
 }
 
 
-def _plan(task):
+def _plan(task: str) -> Plan:
     return Plan.parse(PLANS[task].split())
 
 
-def _run(env, plan, seed):
+def _run(env: Environment, plan: Plan, seed: int) -> list[tuple[str, str]]:
     """Every (step, reason) that did not succeed."""
     env.reset(seed)
     refused = []
@@ -95,7 +96,7 @@ def _run(env, plan, seed):
 
 
 @pytest.mark.parametrize("task", sorted(PLANS))
-def test_a_nominal_plan_runs_and_reaches_its_goal(task):
+def test_a_nominal_plan_runs_and_reaches_its_goal(task: str) -> None:
     loaded = load_task(task).task
     env = flat_environment(loaded.scene, DOMAIN)
     for seed in range(8):
@@ -131,7 +132,7 @@ EXPECTED = {
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
-def test_a_scenario_makes_its_task_fail_at_the_step_concerned(name):
+def test_a_scenario_makes_its_task_fail_at_the_step_concerned(name: str) -> None:
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
     needs = apply_scene_faults(task.scene, scenario.faults, DOMAIN)
@@ -144,7 +145,7 @@ def test_a_scenario_makes_its_task_fail_at_the_step_concerned(name):
     assert failures
 
 
-def test_every_shipped_scenario_is_covered():
+def test_every_shipped_scenario_is_covered() -> None:
     assert set(EXPECTED) <= set(scenario_names())
 
 
@@ -174,7 +175,7 @@ CORRECTED = {
 
 
 @pytest.mark.parametrize("name", sorted(CORRECTED))
-def test_a_scenario_can_be_overcome(name):
+def test_a_scenario_can_be_overcome(name: str) -> None:
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
     env = flat_environment(apply_scene_faults(task.scene, scenario.faults, DOMAIN), DOMAIN)
@@ -182,7 +183,7 @@ def test_a_scenario_can_be_overcome(name):
     assert TruthGoalChecker(DOMAIN).check(task.goal, env.oracle)[0]
 
 
-def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
+def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on() -> None:
     scenario = load_scenario("mug-dropped")
     task = load_task(scenario.task).task
     inner = flat_environment(task.scene, DOMAIN)
@@ -199,7 +200,7 @@ def test_a_dropped_mug_is_picked_up_again_and_the_plan_goes_on():
 
 
 @pytest.mark.parametrize("task", sorted(PLANS))
-def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task):
+def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task: str) -> None:
     loaded = load_task(task).task
     env = KitchenEnvironment(loaded.scene, DOMAIN)
     for seed in (101, 102):
@@ -208,7 +209,7 @@ def test_a_nominal_plan_reaches_its_goal_in_the_real_kitchen(task):
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
-def test_a_scenario_makes_its_task_fail_in_the_real_kitchen(name):
+def test_a_scenario_makes_its_task_fail_in_the_real_kitchen(name: str) -> None:
     scenario = load_scenario(name)
     task = load_task(scenario.task).task
     needs = apply_scene_faults(task.scene, scenario.faults, DOMAIN)

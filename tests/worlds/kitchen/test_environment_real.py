@@ -1,3 +1,4 @@
+# mypy: disable-error-code="arg-type, union-attr"
 """The rules on the real geometry, seen through the real renderer."""
 
 import numpy as np
@@ -22,27 +23,27 @@ NEEDS = SceneNeeds(
 )
 
 
-def _make():
+def _make() -> KitchenEnvironment:
     return KitchenEnvironment(NEEDS, shipped("household"), intrinsics=SMALL)
 
 
 @pytest.fixture(scope="module")
-def env():
+def env() -> KitchenEnvironment:
     return _make()
 
 
-def _do(env, *steps):
+def _do(env: KitchenEnvironment, *steps: str) -> None:
     for step in steps:
         outcome = env.execute(Subtask.parse(step))
         assert outcome.status is SkillStatus.SUCCEEDED, f"{step}: {outcome.reason}"
 
 
-def test_the_kitchen_conforms():
+def test_the_kitchen_conforms() -> None:
     steps = [Subtask.parse(s) for s in ("pick_up(Mug)", "put_in(Mug, Sink)", "open_obj(Fridge)")]
     assert check_environment(_make, 5, steps, shipped("household")) == []
 
 
-def test_a_scan_looks_all_around_and_leaves_the_robot_as_it_was(env):
+def test_a_scan_looks_all_around_and_leaves_the_robot_as_it_was(env: KitchenEnvironment) -> None:
     env.reset(5)
     before = env.observe()
     scan = env.scan()
@@ -57,7 +58,7 @@ def test_a_scan_looks_all_around_and_leaves_the_robot_as_it_was(env):
     assert {"Fridge-1", "Pan-1"} <= seen
 
 
-def test_truth_has_boxes_where_things_are(env):
+def test_truth_has_boxes_where_things_are(env: KitchenEnvironment) -> None:
     env.reset(5)
     truth = env.oracle.truth()
     pan, burner = truth.get("Pan-1"), truth.get("StoveBurner-1")
@@ -65,7 +66,7 @@ def test_truth_has_boxes_where_things_are(env):
     assert abs(pan.box_m.centre[0] - burner.box_m.centre[0]) < 0.2
 
 
-def test_a_held_egg_cracks_into_the_pan_it_is_over(env):
+def test_a_held_egg_cracks_into_the_pan_it_is_over(env: KitchenEnvironment) -> None:
     env.reset(5)
     _do(env, "pick_up(Egg)", "navigate_to_obj(Pan)", "crack_obj(Egg)")
     truth = env.oracle.truth()
@@ -76,7 +77,7 @@ def test_a_held_egg_cracks_into_the_pan_it_is_over(env):
     assert truth.get("Egg-1") is None
 
 
-def test_a_dropped_egg_is_cracked_on_the_floor(env):
+def test_a_dropped_egg_is_cracked_on_the_floor(env: KitchenEnvironment) -> None:
     env.reset(5)
     _do(env, "pick_up(Egg)", "navigate_to_obj(Fridge)")
     assert env.drop_held() == "Egg-1"
@@ -85,7 +86,7 @@ def test_a_dropped_egg_is_cracked_on_the_floor(env):
     assert truth.get("EggCracked-1").box_m.high[2] < 0.05
 
 
-def test_a_dropped_mug_lies_on_the_floor_and_can_be_picked_up(env):
+def test_a_dropped_mug_lies_on_the_floor_and_can_be_picked_up(env: KitchenEnvironment) -> None:
     env.reset(5)
     _do(env, "pick_up(Mug)", "navigate_to_obj(Fridge)")
     env.drop_held()
@@ -94,7 +95,7 @@ def test_a_dropped_mug_lies_on_the_floor_and_can_be_picked_up(env):
     assert env.oracle.truth().get("Mug-1").box_m.low[2] > 0.5
 
 
-def test_what_is_named_wrongly_at_building_is_a_clear_error():
+def test_what_is_named_wrongly_at_building_is_a_clear_error() -> None:
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug", ("Toaster",)),))
     with pytest.raises(SceneError, match="Toaster does not take a Mug"):
         KitchenEnvironment(needs, shipped("household")).reset(0)

@@ -23,10 +23,12 @@ def _fact(truth: SceneGraph, text: str) -> Truth:
     return truth_of(truth, Literal.parse(text), shipped("household"))
 
 
-def test_truth_has_everything_with_all_states_and_no_prepared_things():
+def test_truth_has_everything_with_all_states_and_no_prepared_things() -> None:
     kitchen = SmallKitchen("Plate-1@Microwave-1 dirty=dirty", "Potato-1@Plate-1")
     truth = kitchen.env.oracle.truth()
-    assert truth.get("Plate-1").states == (
+    plate = truth.get("Plate-1")
+    assert plate is not None
+    assert plate.states == (
         ("broken", "intact"), ("dirty", "dirty"), ("temperature", "room")
     )  # fmt: skip
     assert truth.contents("Plate-1", CONTAINING) == ("Potato-1",)
@@ -36,7 +38,7 @@ def test_truth_has_everything_with_all_states_and_no_prepared_things():
     assert _fact(truth, "accessible(Potato-1)") is Truth.FALSE
 
 
-def test_truth_says_what_is_held_and_what_blocks():
+def test_truth_says_what_is_held_and_what_blocks() -> None:
     kitchen = SmallKitchen(
         "Knife-1@CounterTop-1", "Pot-1@CounterTop-1", "Mug-1@CounterTop-1",
         blocked={"Knife-1": "Pot-1"},
@@ -48,7 +50,7 @@ def test_truth_says_what_is_held_and_what_blocks():
     assert _fact(truth, "blocking(Pot-1, Knife-1)") is Truth.TRUE
 
 
-def test_events_tell_the_history_in_facts():
+def test_events_tell_the_history_in_facts() -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1")
     kitchen.do("pick_up(Mug)", "put_in(Mug, Sink)", "toggle_on(Faucet)")
     events = kitchen.env.oracle.events()
@@ -61,7 +63,7 @@ def test_events_tell_the_history_in_facts():
     assert [e.time_s for e in events] == sorted(e.time_s for e in events)
 
 
-def test_a_state_that_does_not_change_is_neither_shown_nor_recorded():
+def test_a_state_that_does_not_change_is_neither_shown_nor_recorded() -> None:
     home = _home(FlatInstance("Mug-1", "Mug"))
     assert not home.set_state("Mug-1", "dirty", "clean")
     assert not home.set_state("Mug-1", "open", "open")
@@ -70,18 +72,18 @@ def test_a_state_that_does_not_change_is_neither_shown_nor_recorded():
     assert [e.text for e in home.events()] == ["dirty(Mug-1)=dirty"]
 
 
-def test_a_value_that_does_not_exist_is_an_error_that_names_the_valid_ones():
+def test_a_value_that_does_not_exist_is_an_error_that_names_the_valid_ones() -> None:
     home = _home(FlatInstance("Mug-1", "Mug"))
     with pytest.raises(UnknownNameError, match="known: clean, dirty"):
         home.set_state("Mug-1", "dirty", "filthy")
 
 
-def test_names_come_in_natural_order():
+def test_names_come_in_natural_order() -> None:
     names = ["Cabinet-10", "Cabinet-2", "Bowl-1"]
     assert sorted(names, key=natural_key) == ["Bowl-1", "Cabinet-2", "Cabinet-10"]
 
 
-def test_spoiling_is_noted_once():
+def test_spoiling_is_noted_once() -> None:
     home = _home(FlatInstance("Mug-1", "Mug"))
     home.spoil("Mug-1", "first")
     home.spoil("Mug-1", "second")
@@ -111,7 +113,7 @@ THINGS = [
 
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed):
+def test_whatever_the_robot_is_told_the_truth_stays_a_possible_state(seed: int) -> None:
     """No exception, at most one thing held, one place for each thing, capacities kept."""
     rng = np.random.default_rng(seed)
     kitchen = SmallKitchen(

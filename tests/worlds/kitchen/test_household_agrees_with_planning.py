@@ -26,17 +26,17 @@ CHOICES = [
 ]
 
 
-def _truth(kitchen: SmallKitchen) -> dict:
+def _truth(kitchen: SmallKitchen) -> dict[object, object]:
     truth = kitchen.env.oracle.truth()
-    facts = {(n.id, a): v for n in truth.nodes for a, v in n.states}
+    facts: dict[object, object] = {(n.id, a): v for n in truth.nodes for a, v in n.states}
     facts |= {
         (n.id, "parent"): truth.parents(n.id, CONTAINING) for n in truth.nodes if n.id != GRIPPER
     }
     return facts | {"held": truth.holding, "spoiled": kitchen.spoiled}
 
 
-def _belief(state: State) -> dict:
-    facts = dict(state.values)
+def _belief(state: State) -> dict[object, object]:
+    facts: dict[object, object] = dict(state.values)
     for name in state.kinds:
         place = state.place(name)
         facts[name, "parent"] = () if place is None else (place.parent,)
@@ -56,12 +56,13 @@ def _random_subtask(rng: np.random.Generator, names: list[str], held: str | None
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_planning_predicts_what_the_household_does(seed):
+def test_planning_predicts_what_the_household_does(seed: int) -> None:
     rng = np.random.default_rng(seed)
     chosen = [str(options[int(rng.integers(len(options)))]) for options in CHOICES]
     kitchen = SmallKitchen(*chosen, cool_down_s=1e9)
     state = State.from_graph(kitchen.env.oracle.truth(), shipped("household"))
-    [state.add(("spoiled", x)) for x in kitchen.spoiled]
+    for spoiled in kitchen.spoiled:
+        state.add(("spoiled", spoiled))
     for _ in range(40):
         subtask = _random_subtask(rng, sorted(state.kinds), state.held)
         outcome = kitchen.env.execute(subtask)

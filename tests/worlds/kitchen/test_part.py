@@ -8,6 +8,7 @@ from forestall.domain.load import shipped
 from forestall.errors import UnknownNameError
 from forestall.types.scene import SceneNeeds
 from forestall.worlds.kitchen import part
+from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.part import Kitchens
 
 
@@ -18,7 +19,7 @@ def test_an_unknown_renderer_is_named_before_a_kitchen_is_built() -> None:
 
 def test_frames_are_remembered_only_where_many_runs_follow(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[object] = []
-    real = part.KitchenEnvironment
+    real = KitchenEnvironment
 
     def environment(*args: object, frames: object) -> object:
         made.append(frames)

@@ -8,7 +8,7 @@ from forestall.types.plan import Subtask
 from forestall.worlds.kitchen.skills import SKILL_TABLE, SkillTimes
 
 
-def test_every_verb_has_a_skill():
+def test_every_verb_has_a_skill() -> None:
     assert set(SKILL_TABLE) == set(shipped("household").skills)
 
 
@@ -93,14 +93,16 @@ REFUSALS = [
 @pytest.mark.parametrize(
     ("things", "first", "step", "reason"), REFUSALS, ids=[f"{r[2]}: {r[3]}" for r in REFUSALS]
 )
-def test_a_skill_refuses_with_the_unmet_need_and_changes_nothing(things, first, step, reason):
+def test_a_skill_refuses_with_the_unmet_need_and_changes_nothing(
+    things: list[str], first: list[str], step: str, reason: str
+) -> None:
     kitchen = SmallKitchen(*things)
     if first:
         kitchen.do(*first)
     assert kitchen.refused(step) == reason
 
 
-def test_a_blocked_thing_is_not_picked_up_until_its_blocker_is_gone():
+def test_a_blocked_thing_is_not_picked_up_until_its_blocker_is_gone() -> None:
     kitchen = SmallKitchen(
         "Knife-1@CounterTop-1", "Pot-1@CounterTop-1", blocked={"Knife-1": "Pot-1"}
     )
@@ -111,7 +113,7 @@ def test_a_blocked_thing_is_not_picked_up_until_its_blocker_is_gone():
     assert kitchen.held == "Knife-1"
 
 
-def test_a_support_without_a_free_spot_refuses():
+def test_a_support_without_a_free_spot_refuses() -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1", spots={"DiningTable-1": 0})
     kitchen.do("pick_up(Mug)")
     assert kitchen.refused("put_on(Mug, DiningTable)") == (
@@ -119,7 +121,7 @@ def test_a_support_without_a_free_spot_refuses():
     )
 
 
-def test_a_refusal_costs_no_more_than_the_drive():
+def test_a_refusal_costs_no_more_than_the_drive() -> None:
     kitchen = SmallKitchen("Pot-1@DiningTable-1", "Knife-1@DiningTable-1",
                            blocked={"Knife-1": "Pot-1"})  # fmt: skip
     driven = kitchen.env.execute(Subtask.parse("navigate_to_obj(DiningTable)")).duration_s
@@ -129,7 +131,7 @@ def test_a_refusal_costs_no_more_than_the_drive():
     assert again.duration_s == 0
 
 
-def test_out_of_reach_means_driving_first():
+def test_out_of_reach_means_driving_first() -> None:
     kitchen = SmallKitchen("Mug-1@DiningTable-1")
     far = kitchen.do("pick_up(Mug)").duration_s
     near = kitchen.do("put_on(Mug, DiningTable)").duration_s
@@ -137,14 +139,14 @@ def test_out_of_reach_means_driving_first():
     assert far > SkillTimes().pick_s
 
 
-def test_what_is_in_a_thing_comes_with_it():
+def test_what_is_in_a_thing_comes_with_it() -> None:
     kitchen = SmallKitchen("Potato-1@Plate-1", "Plate-1@CounterTop-1")
     kitchen.do("pick_up(Plate)", "put_on(Plate, DiningTable)")
     assert kitchen.parent("Plate-1") == "DiningTable-1"
     assert kitchen.parent("Potato-1") == "Plate-1"
 
 
-def test_put_in_and_put_on_are_one_skill_with_the_relation_of_the_receptacle():
+def test_put_in_and_put_on_are_one_skill_with_the_relation_of_the_receptacle() -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1", "Sink-1")
     kitchen.do("pick_up(Mug)", "put_on(Mug, SinkBasin)")
     relations = {str(r) for r in kitchen.env.oracle.truth().relations}
@@ -163,12 +165,12 @@ def test_put_in_and_put_on_are_one_skill_with_the_relation_of_the_receptacle():
         ("toggle_off(Toaster)", "Toaster-1 is already off"),
     ],
 )
-def test_what_is_already_so_succeeds_and_says_so(step, reason):
+def test_what_is_already_so_succeeds_and_says_so(step: str, reason: str) -> None:
     kitchen = SmallKitchen("Fridge-1 open=open", "FloorLamp-1 toggled=on")
     assert kitchen.do(step).reason == reason
 
 
-def test_doors_and_switches_change_and_are_shown():
+def test_doors_and_switches_change_and_are_shown() -> None:
     kitchen = SmallKitchen()
     kitchen.do("open_obj(Microwave)", "close_obj(Microwave)", "toggle_on(Microwave)")
     assert kitchen.state("Microwave-1", "toggled") == "on"
@@ -179,7 +181,7 @@ def test_doors_and_switches_change_and_are_shown():
     ]
 
 
-def test_the_television_is_turned_on_with_the_remote_control_in_hand_and_off_without():
+def test_the_television_is_turned_on_with_the_remote_control_in_hand_and_off_without() -> None:
     kitchen = SmallKitchen("RemoteControl-1@TVStand-1")
     kitchen.do("pick_up(RemoteControl)", "toggle_on(Television)", "put_on(RemoteControl, TVStand)")
     assert kitchen.state("Television-1", "toggled") == "on"
@@ -187,7 +189,7 @@ def test_the_television_is_turned_on_with_the_remote_control_in_hand_and_off_wit
     assert kitchen.state("Television-1", "toggled") == "off"
 
 
-def test_a_knob_turns_its_burner():
+def test_a_knob_turns_its_burner() -> None:
     kitchen = SmallKitchen()
     kitchen.do("toggle_on(StoveKnob-2)")
     assert kitchen.state("StoveBurner-2", "toggled") == "on"
@@ -195,7 +197,7 @@ def test_a_knob_turns_its_burner():
     assert kitchen.do("toggle_on(StoveBurner-2)").reason == "StoveBurner-2 is already on"
 
 
-def test_slicing_makes_slices_at_the_place_and_the_whole_vanishes():
+def test_slicing_makes_slices_at_the_place_and_the_whole_vanishes() -> None:
     kitchen = SmallKitchen("Potato-1@CounterTop-2 cooked=cooked", "Knife-1@CounterTop-1")
     kitchen.do("pick_up(Knife)", "slice_obj(Potato)")
     assert kitchen.env.oracle.truth().get("Potato-1") is None
@@ -206,7 +208,7 @@ def test_slicing_makes_slices_at_the_place_and_the_whole_vanishes():
         assert kitchen.state(name, "sliced") == "sliced"
 
 
-def test_an_egg_held_over_a_pan_lands_in_it():
+def test_an_egg_held_over_a_pan_lands_in_it() -> None:
     kitchen = SmallKitchen("Egg-1@CounterTop-1", "Pan-1@StoveBurner-1")
     kitchen.do("pick_up(Egg)", "navigate_to_obj(Pan)", "crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "Pan-1"
@@ -214,41 +216,43 @@ def test_an_egg_held_over_a_pan_lands_in_it():
     assert kitchen.do("put_in(EggCracked, Pan)").reason == "EggCracked-1 is already there"
 
 
-def test_an_egg_held_over_a_burner_lands_in_the_pan_on_it():
+def test_an_egg_held_over_a_burner_lands_in_the_pan_on_it() -> None:
     kitchen = SmallKitchen("Egg-1@CounterTop-1", "Pan-1@StoveBurner-1")
     kitchen.do("pick_up(Egg)", "navigate_to_obj(StoveBurner-1)", "crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "Pan-1"
 
 
-def test_an_egg_held_over_a_counter_lands_on_it_and_not_on_a_plate_there():
+def test_an_egg_held_over_a_counter_lands_on_it_and_not_on_a_plate_there() -> None:
     kitchen = SmallKitchen("Egg-1@DiningTable-1", "Plate-1@CounterTop-1")
     kitchen.do("pick_up(Egg)", "navigate_to_obj(CounterTop-1)", "crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "CounterTop-1"
 
 
-def test_an_egg_held_before_something_that_takes_none_lands_on_the_floor():
+def test_an_egg_held_before_something_that_takes_none_lands_on_the_floor() -> None:
     kitchen = SmallKitchen("Egg-1@DiningTable-1")
     kitchen.do("pick_up(Egg)", "navigate_to_obj(Microwave)", "crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "Floor-1"
 
 
-def test_an_egg_held_over_a_vessel_without_room_lands_below_it():
+def test_an_egg_held_over_a_vessel_without_room_lands_below_it() -> None:
     kitchen = SmallKitchen("Egg-1@DiningTable-1", "Pan-1@CounterTop-1", spots={"Pan-1": 0})
     kitchen.do("pick_up(Egg)", "navigate_to_obj(Pan)", "crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "CounterTop-1"
 
 
-def test_an_egg_that_finds_no_room_at_all_is_not_cracked():
+def test_an_egg_that_finds_no_room_at_all_is_not_cracked() -> None:
     kitchen = SmallKitchen("Egg-1@DiningTable-1", spots={"Floor-1": 0})
     kitchen.do("pick_up(Egg)", "navigate_to_obj(Microwave)")
     assert kitchen.refused("crack_obj(Egg)") == "there is no room for what is in Egg-1"
 
 
-def test_what_the_geometry_cannot_do_is_refused_and_changes_nothing(monkeypatch):
+def test_what_the_geometry_cannot_do_is_refused_and_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1")
     kitchen.do("pick_up(Mug)")
 
-    def jammed(thing, receptacle):
+    def jammed(thing: str, receptacle: str) -> None:
         raise SceneError(f"{receptacle} has no room for {thing}")
 
     monkeypatch.setattr(kitchen.world, "place", jammed)
@@ -256,20 +260,20 @@ def test_what_the_geometry_cannot_do_is_refused_and_changes_nothing(monkeypatch)
     assert kitchen.held == "Mug-1"
 
 
-def test_an_egg_that_is_not_held_cracks_where_it_lies():
+def test_an_egg_that_is_not_held_cracks_where_it_lies() -> None:
     kitchen = SmallKitchen("Egg-1@Bowl-1", "Bowl-1@CounterTop-1")
     kitchen.do("crack_obj(Egg)")
     assert kitchen.parent("EggCracked-1") == "Bowl-1"
     assert kitchen.env.oracle.truth().get("Egg-1") is None
 
 
-def test_putting_an_egg_that_was_cracked_elsewhere_is_refused():
+def test_putting_an_egg_that_was_cracked_elsewhere_is_refused() -> None:
     kitchen = SmallKitchen("Egg-1@Bowl-1", "Bowl-1@CounterTop-1", "Pan-1@StoveBurner-1")
     kitchen.do("crack_obj(Egg)")
     assert kitchen.refused("put_in(EggCracked, Pan)") == "EggCracked-1 is not in the gripper"
 
 
-def test_pouring_fills_what_is_empty_with_the_liquid_and_its_temperature():
+def test_pouring_fills_what_is_empty_with_the_liquid_and_its_temperature() -> None:
     kitchen = SmallKitchen(
         "Mug-1@CounterTop-1 filled=coffee temperature=hot", "Bowl-1@CounterTop-1"
     )
@@ -279,14 +283,14 @@ def test_pouring_fills_what_is_empty_with_the_liquid_and_its_temperature():
     assert kitchen.state("Bowl-1", "temperature") == "hot"
 
 
-def test_pouring_into_a_sink_drains():
+def test_pouring_into_a_sink_drains() -> None:
     kitchen = SmallKitchen("Bowl-1@CounterTop-1 filled=wine")
     kitchen.do("pick_up(Bowl)", "pour(Bowl, SinkBasin)")
     assert kitchen.state("Bowl-1", "filled") == "empty"
     assert "spill" not in kitchen.kinds()
 
 
-def test_pouring_into_what_is_full_spills():
+def test_pouring_into_what_is_full_spills() -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1 filled=water", "Cup-1@CounterTop-1 filled=wine")
     kitchen.do("pick_up(Mug)", "pour(Mug, Cup)")
     assert kitchen.state("Mug-1", "filled") == "empty"
@@ -294,7 +298,7 @@ def test_pouring_into_what_is_full_spills():
     assert "spill" in kitchen.kinds()
 
 
-def test_navigating_to_the_held_thing_is_no_drive():
+def test_navigating_to_the_held_thing_is_no_drive() -> None:
     kitchen = SmallKitchen("Mug-1@CounterTop-1")
     kitchen.do("pick_up(Mug)")
     assert kitchen.do("navigate_to_obj(Mug)").duration_s == 0

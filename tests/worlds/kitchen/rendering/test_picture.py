@@ -1,3 +1,4 @@
+# mypy: disable-error-code="arg-type, union-attr"
 """How the picture looks: light, glow, textures, smooth edges, transparency, determinism."""
 
 from __future__ import annotations
@@ -5,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from room import CAMERA, FORWARD, KINDS, Room, mixed_room, wall
 
@@ -129,7 +131,7 @@ def test_edge_pixels_lie_between_both_sides() -> None:
 
 @BOTH
 def test_transparent_geom_lets_the_wall_through(name: str) -> None:
-    def centre(alpha: float) -> np.ndarray:
+    def centre(alpha: float) -> npt.NDArray[np.int_]:
         room = wall(Room(), rgba=(0.1, 0.2, 0.9, 1)).light((0.2, 0, 1))
         room.add("pane", KINDS.mjGEOM_BOX, (0.01, 0.4, 0.4), (1.5, 0, 0),
                  rgba=(0.9, 0.2, 0.1, alpha), instance="Pane-1")  # fmt: skip
@@ -137,7 +139,8 @@ def test_transparent_geom_lets_the_wall_through(name: str) -> None:
         assert frame.depth_m[60, 80] == pytest.approx(1.49, abs=1e-4)
         assert frame.instance_ids is not None
         assert frame.instance_ids[60, 80] == 0
-        return frame.rgb[60, 80].astype(int)
+        colour: npt.NDArray[np.int_] = frame.rgb[60, 80].astype(int)
+        return colour
 
     solid, glass = centre(1.0), centre(0.3)
     assert glass[2] > solid[2] + 40

@@ -13,7 +13,7 @@ import pytest
 from room import CAMERA, mixed_room
 
 from forestall.errors import InputError
-from forestall.worlds.kitchen.rendering import factory, probe
+from forestall.worlds.kitchen.rendering import probe
 from forestall.worlds.kitchen.rendering.gl import GlRenderer
 
 
@@ -109,7 +109,7 @@ def without_embreex(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "embreex.rtcore_scene", raising=False)
     load = importlib.import_module
     monkeypatch.setattr(
-        factory.importlib, "import_module", lambda n: refuse(n) if "embreex" in n else load(n)
+        importlib, "import_module", lambda n: refuse(n) if "embreex" in n else load(n)
     )
 
 
