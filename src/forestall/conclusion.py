@@ -99,18 +99,24 @@ def _held(decision: MonitorDecision, hold: Hold, why: str) -> MonitorDecision:
 
 
 def _not_judged(context: BoundaryContext, answer: StrategyAnswer, strategy: str) -> str:
-    """Why nothing was judged, empty where something was."""
-    verdict = answer.verdict
+    """Why nothing was judged, empty where something was.
+
+    One rule stands above what a detector says: nothing is said to fit whose arguments were not
+    located. An alarm was judged, whatever else was not seen.
+    """
+    verdict, again = answer.verdict, answer.decision is Decision.LOOK_AGAIN
+    if verdict is not None and verdict.decision is Decision.REPLAN and not again:
+        return ""
+    unseen = unlocated(context)
+    if unseen and verdict is not None:
+        return f"not located: {', '.join(unseen)}"
     if verdict is None:
         return answer.why or f"the strategy {strategy} does not judge here"
     if not verdict.judged:
         return verdict.note or "there was nothing to compare with"
-    unseen = unlocated(context)
-    if answer.decision is Decision.LOOK_AGAIN and not unseen:
+    if again:
         return f"another look is asked for and none is left: {answer.why or verdict.note}"
-    if answer.decision is not Decision.LOOK_AGAIN and verdict.decision is Decision.REPLAN:
-        return ""  # an alarm was judged, whatever else was not seen
-    return f"not located: {', '.join(unseen)}" if unseen else ""
+    return ""
 
 
 def unlocated(context: BoundaryContext) -> tuple[str, ...]:

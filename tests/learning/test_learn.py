@@ -1,0 +1,108 @@
+"""A domain from twelve demonstrations in a stranger's words."""
+
+from __future__ import annotations
+
+import pytest
+
+from forestall.assembly.sources import demonstrations_from
+from forestall.domain.load import read_domain
+from forestall.domain.toml_out import domain_toml
+from forestall.errors import InputError
+from forestall.learning.learn import learn
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.state import State
+from forestall.types.plan import Subtask
+from forestall.types.symbolic import scene_graph
+from stranger import TWELVE, scene
+
+LEARNT = learn(demonstrations_from(TWELVE))
+DOMAIN = LEARNT.domain
+
+
+def needs(skill: str) -> set[str]:
+    return {str(n.formula) for n in DOMAIN.skill(skill).needs}
+
+
+def effects(skill: str) -> set[str]:
+    return {str(f) for e in DOMAIN.skill(skill).effects for f in e.facts}
+
+
+def test_skills_have_the_arity_that_was_shown_and_names_from_categories() -> None:
+    assert {s: DOMAIN.skill(s).roles for s in DOMAIN.skills} == {
+        "grasp": ("peg",),
+        "insert": ("peg", "hole", "driver"),
+        "unscrew": ("lid", "hole"),
+    }
+
+
+def test_what_always_held_is_needed() -> None:
+    assert needs("insert") == {
+        "held_by(?peg, gripper)",
+        "surface(?hole)=clean",
+        "vacant(?hole)",
+    }
+    assert "hand_empty()" in needs("grasp")
+    assert "thread(?lid)=tight" in needs("unscrew")
+
+
+def test_what_always_changed_is_done() -> None:
+    assert effects("grasp") == {"held_by(?peg, gripper)"}
+    assert effects("insert") == {"not held_by(?peg, gripper)", "seated_in(?peg, ?hole)"}
+    assert effects("unscrew") == {"thread(?lid)=loose"}
+
+
+def test_what_a_relation_is_for_follows_from_its_use() -> None:
+    assert DOMAIN.roles.holding == "held_by"
+    assert set(DOMAIN.containing) == {"lies_in", "seated_in"}
+    assert DOMAIN.robot.hands == ("gripper",)
+    assert DOMAIN.is_a("peg-1", DOMAIN.roles.movable)
+    assert DOMAIN.is_a("hole-1", DOMAIN.roles.fixture)
+
+
+def test_the_learnt_skills_run() -> None:
+    state = State.from_graph(scene_graph(scene()), DOMAIN)
+    for text in ("grasp(peg-1)", "insert(peg-1, hole-1, driver-1)"):
+        after = apply(state, Subtask.parse(text))
+        assert not isinstance(after, Refusal), after
+        state = after
+    assert state.place("peg-1") is not None
+    again = apply(state, Subtask.parse("insert(peg-1, hole-1, driver-1)"))
+    assert isinstance(again, Refusal)
+    assert again.reason == "peg-1 not held by gripper, unlike in all 12 demonstrated uses"
+
+
+def test_a_draft_is_written_and_read_back() -> None:
+    assert read_domain(domain_toml(DOMAIN), "draft.toml") == DOMAIN
+
+
+def test_it_says_what_it_cannot_do() -> None:
+    assert any("habit and need" in x for x in LEARNT.limits)
+    once = learn(demonstrations_from([TWELVE[0][:2]])).limits
+    assert any(x.startswith("grasp was shown only once") for x in once)
+    assert any(x.startswith("what grasp does is not known") for x in once)
+
+
+def test_hands_may_be_named_and_there_may_be_none() -> None:
+    two = {
+        "objects": {"left_gripper": {}, "right_gripper": {}, "cup-1": {}},
+        "relations": ["cup-1 held_by left_gripper"],
+    }
+    assert learn(demonstrations_from([[("pass(cup-1)", two)]])).domain.robot.hands == (
+        "left_gripper",
+        "right_gripper",
+    )
+    none = learn(demonstrations_from([[("push(cup-1)", {"objects": ["cup-1"]})]])).domain
+    assert none.robot.hands == () and none.roles.holding is None
+    named = learn(demonstrations_from([[("pass(cup-1)", two)]]), hands=["left_gripper"])
+    assert named.domain.robot.hands == ("left_gripper",)
+
+
+def test_a_skill_with_changing_arity_is_refused_by_name() -> None:
+    other = [("grasp(peg-1, tray-1)", scene())]
+    with pytest.raises(InputError, match=r"grasp has not always equally many.*grasp\(peg-1\) and"):
+        learn(demonstrations_from([TWELVE[0], other]))
+
+
+def test_nothing_is_learnt_from_nothing() -> None:
+    with pytest.raises(InputError, match="nothing to learn from"):
+        learn([])
