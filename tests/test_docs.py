@@ -7,7 +7,7 @@ import pytest
 
 from forestall.assembly.configuration import run_config
 from forestall.assembly.make import prepare
-from forestall.cli.main import app
+from forestall.cli.main import app, call
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
@@ -36,7 +36,7 @@ def test_every_command_exists(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
     known = {name for name in app if not name.startswith("-")}
     named = set(re.findall(r"\bforestall ([a-z]+)\b", text.replace("`forestall`", "")))
-    prose = {"stops", "speaks", "record"}
+    prose = {"stops", "speaks", "record", "import"}
     assert named - prose <= known
 
 
@@ -50,3 +50,26 @@ def test_the_example_files_are_valid(tmp_path: Path) -> None:
     (tmp_path / "with-attribute.toml").write_text(task + attributes)
     words = prepare(run_config(str(tmp_path / "with-attribute.toml"))).loaded.domain
     assert words.phrases("Tomato", "ripe", "unripe") == ("an unripe tomato", "a green tomato")
+
+
+def test_the_page_for_ones_own_robot_runs_and_prints_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "your-robot.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```(python|text|bash|json)\n(.*?)```", page, re.S)
+    names: dict[str, object] = {}
+    printed = ""
+    for kind, text in blocks:
+        if kind == "python":
+            exec(compile(text, "docs/your-robot.md", "exec"), names)
+            printed = capsys.readouterr().out
+        elif kind == "text":
+            assert printed == text
+        elif kind == "bash":
+            for line in text.splitlines():
+                assert call(line.split()[1:]) == 0, line
+        else:
+            (tmp_path / "one.json").write_text(text, encoding="utf-8")
+            assert call(["demos", "add", "other.db", "one.json"]) == 0
+    assert [k for k, _ in blocks].count("python") == 5

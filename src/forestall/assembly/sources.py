@@ -21,7 +21,7 @@ from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
 from forestall.records.record import read_record
 from forestall.types.demonstration import Demonstration, DemonstrationStep
-from forestall.types.facts import is_instance
+from forestall.types.facts import Literal, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.symbolic import scene_graph
@@ -29,6 +29,9 @@ from forestall.types.symbolic import scene_graph
 MEMORY_SUFFIXES = (".db", ".sqlite", ".sqlite3")
 RECORD_FILES = ("record.json", "boundaries.jsonl")
 WRITTEN_KEYS = ("task", "scene", "steps", "final")
+LABEL = "a person's label"
+"""Where a demonstration comes from that nobody ran."""
+
 _PAIR = 2
 
 Source = Any
@@ -94,6 +97,60 @@ def written(data: Any, folder: Path | None = None) -> Demonstration:
             raise InputError(f"step {number}: {error}") from error
     last = None if final is None else _scene(final, folder)
     return Demonstration(task, scene, 0, tuple(made), version=forestall.__version__, final=last)
+
+
+def labelled(
+    subtask: str, scene: Path | None = None, facts: Iterable[str] = (), task: str = ""
+) -> Demonstration:
+    """A demonstration of one step, which somebody says should look so; it says so itself.
+
+    Args:
+        subtask: in text form.
+        scene: a file with a graph.
+        facts: that hold, in text form, over instances: states and relations.
+        task: the name of its task.
+
+    Raises:
+        InputError: neither a scene nor a fact, a fact that does not hold of anything, or a file
+            that cannot be read.
+    """
+    given: dict[str, Any] = {"objects": {}, "relations": []}
+    for fact in map(Literal.parse, facts):
+        if fact.value == "false" or len(fact.args) not in (1, _PAIR):
+            raise InputError(
+                f"the fact '{fact}' cannot be drawn: write states, attribute(thing-1)=value, and "
+                "relations that hold, relation(thing-1, thing-2)"
+            )
+        for name in fact.args:
+            given["objects"].setdefault(name, {})
+        if fact.is_state:
+            given["objects"][fact.args[0]][fact.predicate] = fact.value
+        elif len(fact.args) == _PAIR:
+            given["relations"].append((fact.args[0], fact.predicate, fact.args[1]))
+    graph = scene_graph(given)
+    if scene is not None:
+        graph = _over(graph, _scene(scene.name, scene.parent))
+    if not graph.nodes:
+        raise InputError("a label says nothing: give a scene, or a fact")
+    steps = [{"subtask": subtask, "scene": graph}]
+    made = written({"task": task, "scene": "label", "steps": steps})
+    return replace(made, perception=(("source", LABEL),))
+
+
+def _over(said: SceneGraph, seen: SceneGraph) -> SceneGraph:
+    """A scene with what is said beside it: more things, states and relations."""
+    own = {n.id: n for n in said.nodes}
+    nodes = [
+        replace(n, states=tuple({**dict(n.states), **dict(own.pop(n.id).states)}.items()))
+        if n.id in own
+        else n
+        for n in seen.nodes
+    ]
+    return replace(
+        seen,
+        nodes=(*nodes, *own.values()),
+        relations=(*seen.relations, *said.relations),
+    )
 
 
 def _from(source: Source) -> list[Demonstration]:

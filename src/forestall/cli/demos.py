@@ -13,6 +13,8 @@ from cyclopts import App, Parameter
 from forestall.cli.flags import SeeingFlags
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from forestall.assembly.configuration import RunConfig
     from forestall.types.demonstration import Demonstration
 
@@ -76,35 +78,60 @@ def record(
 
 
 @demos.command
-def add(memory: Path, /, *runs: Path) -> int:
-    """Keep runs that were recorded before as demonstrations.
+def add(memory: Path, /, *sources: Path) -> int:
+    """Keep what shows a successful run as demonstrations.
 
     Args:
         memory: the demonstration file to add to; made when it does not exist.
-        runs: folders of `forestall run`; every one must have succeeded without a replanning, a
-            refusal or a failure on the way.
+        sources: folders of `forestall run`, every one of which must have succeeded without a
+            replanning, a refusal or a failure on the way; another memory; a demonstration that
+            somebody wrote, or a graph with its subtask (JSON, docs/your-robot.md); or folders of
+            these.
     """
-    import forestall
+    from forestall.assembly.sources import demonstrations_from
     from forestall.errors import InputError
-    from forestall.memory.recording import demonstration_from
-    from forestall.memory.store import open_store
-    from forestall.records.record import read_record
 
-    if not runs:
-        raise InputError("no run was named: give the folder of at least one")
-    found = []
-    for folder in runs:
-        demonstration = demonstration_from(read_record(folder), forestall.__version__)
-        if demonstration is None:
-            raise InputError(
-                f"{folder} is no demonstration: only a finished run becomes one that succeeded "
-                "without a new plan, a refusal or a failure on the way"
-            )
-        found.append(demonstration)
+    if not sources:
+        raise InputError("no source was named: give the folder of at least one run, or a file")
+    return _kept(memory, demonstrations_from(sources))
+
+
+@demos.command
+def label(
+    memory: Path,
+    scene: Path | None = None,
+    /,
+    *,
+    subtask: str,
+    fact: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    task: str = "",
+) -> int:
+    """Keep what somebody says should hold before a subtask.
+
+    One label is enough for an alarm; its cause says that it is one.
+
+    Args:
+        memory: the demonstration file to add to; made when it does not exist.
+        scene: a scene graph (JSON, docs/your-robot.md) as it should be.
+        subtask: before which, e.g. "insert(peg-1, hole-1)".
+        fact: instead of a scene, or beside it: "surface(hole-1)=clean", "held_by(peg-1, gripper)".
+        task: the name of its task.
+    """
+    from forestall.assembly.sources import labelled
+
+    return _kept(memory, [labelled(subtask, scene, fact or (), task)])
+
+
+def _kept(memory: Path, found: Sequence[Demonstration]) -> int:
+    from forestall.memory.store import open_store
+
     with open_store(memory, create=True) as store:
+        before = len(store)
         for demonstration in found:
             store.add(demonstration)
-    print(f"{len(found)} demonstrations added to {memory}")
+        added = len(store) - before
+    known = f", {len(found) - added} were there already" if added < len(found) else ""
+    print(f"{added} demonstrations added to {memory}{known}")
     return 0
 
 

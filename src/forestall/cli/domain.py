@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
@@ -57,6 +58,36 @@ def show(name: str, /) -> int:
         several = ", ".join(map(str, predicate.parameters))
         print(f"  {predicate.kind.value:<10}{predicate.name}({several}){values}")
     print(f"\nskills:\n\n{skill_sheet(found)}", end="")
+    return 0
+
+
+@domain.command
+def learn(*sources: Path, out: Path | None = None, name: str = "learnt") -> int:
+    """Draft a domain file from demonstrations alone, to be corrected by hand.
+
+    Args:
+        sources: memory files, folders of runs, demonstrations that somebody wrote (JSON).
+        out: the file to write; printed by default.
+        name: of the domain.
+    """
+    from forestall.assembly.sources import demonstrations_from
+    from forestall.domain.toml_out import domain_toml
+    from forestall.errors import InputError
+    from forestall.learning.learn import learn as learnt_from
+
+    if not sources:
+        raise InputError("no source was named: give a memory file, or a folder of demonstrations")
+    learnt = learnt_from(demonstrations_from(sources), name=name)
+    said = "".join(f"# - {limit}\n" for limit in learnt.limits)
+    text = (
+        f"# Learnt from {learnt.demonstrations} demonstrations; read and correct it. "
+        f"What is not known:\n{said}\n{domain_toml(learnt.domain)}"
+    )
+    if out is None:
+        print(text, end="")
+        return 0
+    out.write_text(text, encoding="utf-8")
+    print(f"{out}: {_sentence(learnt.domain)}")
     return 0
 
 

@@ -68,7 +68,7 @@ class Vocabulary:
         hand_empty: the derived fact that a hand is free, None where nothing was ever held.
         exclusive: whether nothing was ever in two places at once, a hand being one.
         takers: relation → categories that took things in it.
-        moved: categories of what was ever seen to change its place.
+        moved: categories of what was ever seen in a hand, or to change its place.
     """
 
     hands: tuple[str, ...]
@@ -195,6 +195,8 @@ def vocabulary(found: Sequence[Trace], hands: Sequence[str] | None = None) -> Vo
     taken = {p: _ends(graphs, p, 1) for p in containing}
     places = (*containing, *((holding,) if holding else ()))
     moving = {changed[p] for p in places if p in changed}
+    if holding is not None:
+        moving.add(_ends(graphs, holding, 0))
     takers = frozenset(c for who in taken.values() for c in who)
     names = set(used)
     lacks = _lacks(others, containing, takers, names)
