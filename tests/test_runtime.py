@@ -142,6 +142,49 @@ def test_scenarios_fail_unwatched_and_succeed_watched(scenario: str) -> None:
     assert any(b.replan is not None and b.replan.plan is not None for b in watched.boundaries)
 
 
+@pytest.mark.parametrize("task", task_names())
+def test_without_demonstrations_undisturbed_runs_go_through(task: str) -> None:
+    for strategy in ("plan-check", "retry-once"):
+        record = play(run_config(task, strategy=strategy, seed=5))
+        assert record.success, (strategy, record.failures)
+        assert len(record.executed) == len(record.initial_plan), strategy
+        assert not alarms(record)
+
+
+@pytest.mark.parametrize("scenario", ON_FLAT_WORLDS)
+def test_the_plan_check_saves_what_the_domain_knows_without_a_demonstration(scenario: str) -> None:
+    record = play(run_config(load_scenario(scenario).task, scenario, seed=3, strategy="plan-check"))
+    assert record.success, record.failures
+    first = alarms(record)[0]
+    assert first.verdict is not None and first.verdict.detector == "plan check"
+
+
+def test_a_skill_that_fails_once_is_tried_once_more() -> None:
+    class Slipping(KitchenEnvironment):
+        failures = 1
+
+        def execute(self, subtask: Subtask) -> SkillOutcome:
+            if subtask.skill == "pick_up" and self.failures:
+                self.failures -= 1
+                return SkillOutcome(SkillStatus.FAILED, 1.0, "it slipped")
+            return super().execute(subtask)
+
+    loaded = load_task("make-coffee")
+    planned = [s for s in loaded.task.plan if s.skill == "pick_up"]
+    config = run_config("make-coffee", strategy="retry-once")
+    for failures, repeated in ((0, 0), (1, 1), (1000, len(planned))):
+        kitchen = flat_environment(loaded.task.scene, loaded.domain)
+        kitchen.__class__ = Slipping
+        kitchen.failures = failures  # type: ignore[attr-defined]
+        strategy = make_strategy(config, loaded.domain, None)
+        runtime = Runtime(kitchen, TruthPerceiver(kitchen, loaded.domain), strategy, loaded.domain)
+        record = runtime.run(loaded.task, loaded.task.plan, 0)
+        done, _, _ = TruthGoalChecker(loaded.domain).check(loaded.task.goal, kitchen.oracle)
+        assert done is (failures < 1000)
+        tries = [e for e in record.executed if e.subtask.skill == "pick_up"]
+        assert len(tries) == len(planned) + repeated
+
+
 def test_the_alarm_comes_before_the_subtask_and_names_the_cause() -> None:
     record = play(run_config("heat-potato", "microwave-occupied", seed=3), memory())
     alarms = [

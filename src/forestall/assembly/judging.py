@@ -46,6 +46,7 @@ from forestall.replanning.anew import GoalReplanner
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.seams import Detector, Parts, PlanValidator
 from forestall.strategies.online import Online, OnlineScene
+from forestall.strategies.plan_check import PlanChecking
 from forestall.strategies.post_hoc import PostHoc
 from forestall.strategies.proactive import Proactive
 from forestall.strategies.watch import Watch
@@ -53,9 +54,9 @@ from forestall.types.kind import Settled
 
 S = TypeVar("S")
 
-_PROACTIVE, _POST_HOC, _ONLINE = (
+_PROACTIVE, _POST_HOC, _ONLINE, _PLAN_CHECK = (
     signature(strategy).parameters["max_attempts"].default
-    for strategy in (Proactive, PostHoc, Online)
+    for strategy in (Proactive, PostHoc, Online, PlanChecking)
 )
 """How often each strategy tries, as it has it by itself."""
 
@@ -212,6 +213,11 @@ def _stepping_in(strategy: Callable[..., S], parts: Parts, max_attempts: int, *m
         *more,
         max_attempts=max_attempts,
     )
+
+
+def plan_check(parts: Parts, *, max_attempts: int = _PLAN_CHECK) -> PlanChecking:
+    """Before each subtask, by the rest of the plan and without demonstrations."""
+    return PlanChecking(parts.part(REPLANNER), parts.part(VALIDATOR), max_attempts)
 
 
 def watch(parts: Parts) -> Watch:

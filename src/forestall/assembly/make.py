@@ -41,6 +41,9 @@ from forestall.types.plan import Plan
 STORED_STATES = "given"
 """The states of stored observations, which no run has."""
 
+WITHOUT_MEMORY = ("none", "plan-check", "retry-once")
+"""Strategies that compare with no demonstration."""
+
 PACKAGES = ("numpy", "scipy", "mujoco-core", "embreex", "onnxruntime")
 """Whose versions stand in every record."""
 
@@ -99,7 +102,7 @@ def prepare(config: RunConfig) -> Prepared:
 
 def needs_memory(config: RunConfig) -> bool:
     """Whether a run compares with demonstrations."""
-    return config.choice(STRATEGY).name != "none"
+    return config.choice(STRATEGY).name not in WITHOUT_MEMORY
 
 
 def make_world(config: RunConfig, domain: Domain) -> WorldPart:

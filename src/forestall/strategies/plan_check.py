@@ -1,0 +1,102 @@
+"""The plan check as a judge: does what is left of the plan run on what is seen?
+
+Called by the monitor before each subtask; validator and replanner come through the constructor. It
+needs no demonstration, judges steps that none has, and sees a wrong plan before it starts. It knows
+what the domain file knows, and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from forestall.domain.model import Domain
+from forestall.seams import PlanValidator, Replanner
+from forestall.strategies.intervention import (
+    PLAN_CHECK,
+    Clock,
+    Intervention,
+    checked,
+    look_again,
+    rest_of,
+)
+from forestall.types.episode import SkillOutcome
+from forestall.types.facts import Literal
+from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
+from forestall.types.verdict import Decision, Diagnosis, PlanCheck
+
+_GO_ON = StrategyAnswer(Decision.PROCEED)
+
+
+class PlanChecking:
+    """Executes the rest of the plan on the observed graph before each subtask.
+
+    - it runs and reaches the goal: proceed, unless what the next subtask relies on was not seen;
+    - it does not: another look, then an alarm and a plan from what is seen.
+
+    Args:
+        replanner: makes the corrected plan.
+        validator: executes what is left of a plan on what is seen.
+        max_attempts: repairs of one cause.
+    """
+
+    name = "plan-check"
+    looks_after = LooksAfter.NOTHING
+
+    def __init__(
+        self, replanner: Replanner, validator: PlanValidator, max_attempts: int = 2
+    ) -> None:
+        self._validator = validator
+        self._intervention = Intervention(replanner, validator, max_attempts)
+
+    def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
+        """Execute what is left in the mind; on a refusal replan."""
+        self._intervention.begin(context)
+        clock = Clock()
+        if context.subtask in context.refused:
+            return self._intervention.refused(context, clock)
+        domain = self._validator.domain
+        check = self._validator.check(rest_of(context, domain), context.graph, context.task.goal)
+        clock.lap("validate")
+        verdict = checked(PLAN_CHECK, check.ok, _note(check))
+        if not check.ok:
+            diagnosis = Diagnosis(
+                cause=f"what is left of the plan would not work: {check.reason}",
+                must_change=check.lacking or check.unmet,
+                producer=PLAN_CHECK,
+            )
+            if context.may_look:
+                return look_again(verdict, clock, diagnosis.cause)
+            return self._intervention.alarm(context, verdict, diagnosis, clock)
+        unseen = _relied_on_now(check, context, domain)
+        if unseen:
+            why = f"not observed: {', '.join(map(str, unseen))}"
+            return look_again(replace(verdict, note=why), clock, why)
+        return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+
+    def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
+        """Go on: what went wrong shows at the next boundary."""
+        return _GO_ON
+
+    def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
+        """Go on: the last check was before the last subtask."""
+        return _GO_ON
+
+
+def _relied_on_now(
+    check: PlanCheck, context: BoundaryContext, domain: Domain
+) -> tuple[Literal, ...]:
+    """Unobserved facts about the next subtask's arguments that bear on whether it can run."""
+    return tuple(
+        x
+        for x in check.assumed
+        if set(x.args) & set(context.subtask.args)
+        and not ((known := domain.attributes.get(x.predicate)) and known.material)
+    )
+
+
+def _note(check: PlanCheck) -> str:
+    if check.ok:
+        return "what is left of the plan runs on what is seen"
+    if check.step is None:
+        return check.reason
+    return f"step {check.step + 1} of what is left cannot run: {check.reason}"
