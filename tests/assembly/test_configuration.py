@@ -15,7 +15,7 @@ from forestall.assembly.make import make_strategy, prepare, provenance
 from forestall.assembly.parts import Assembly
 from forestall.cli.flags import RunFlags, spelt
 from forestall.domain.load import shipped
-from forestall.errors import FileFormatError, InputError
+from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.kinds import (
     DETECTOR,
     DOMAIN,
@@ -154,8 +154,12 @@ def test_what_was_said_of_one_part_is_said_once() -> None:
 def test_a_run_is_of_its_tasks_domain_and_says_so(tmp_path: Path) -> None:
     assert run_config("fasten-plate").choice(DOMAIN).name == "bench"
     assert run_config("fasten-plate", domain="bench").choice(DOMAIN).name == "bench"
-    with pytest.raises(InputError, match="'fasten-plate' is of the domain 'bench', not 'house"):
+    with pytest.raises(InputError, match="fasten-plate does not fit the domain 'household': unkn"):
         run_config("fasten-plate", domain="household")
+    with pytest.raises(UnknownNameError, match="domain 'benhc': did you mean bench"):
+        run_config("fasten-plate", domain="benhc")
+    with pytest.raises(FileFormatError, match=r"domain file absent\.toml"):
+        run_config("fasten-plate", domain="absent.toml")
     shipped_file = files("forestall.domains") / "bench" / "domain.toml"
     (tmp_path / "own.toml").write_text(shipped_file.read_text().replace('"bench"', '"own"', 1))
     task = (files("forestall.domains") / "bench" / "tasks" / "fasten-plate.toml").read_text()

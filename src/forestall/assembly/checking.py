@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from forestall.assembly.configuration import Given, choices, same_domain
+from forestall.assembly.configuration import Given, choices, run_config
 from forestall.assembly.make import STORED_STATES
 from forestall.assembly.options import built
 from forestall.assembly.parts import Assembly
@@ -18,7 +18,6 @@ from forestall.domain.names import ground_subtask
 from forestall.errors import UnknownNameError
 from forestall.kinds import DETECTOR, DOMAIN, PERCEIVER, REASONER, RETRIEVER, STATES
 from forestall.perception.folder import read_observation
-from forestall.tasks.files import load_task
 from forestall.types.demonstration import Demonstration
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
@@ -58,9 +57,7 @@ def judge_stored(
     if names[STATES.name] == TRUTH_STATES:
         readable = [n for n in known(STATES.name) if n != TRUTH_STATES]
         raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)
-    loaded = None if task is None else load_task(task)
-    if task is not None and loaded is not None:
-        same_domain(given or Given(), task, loaded.domain.name)
+    loaded = None if task is None else run_config(task, given=given).load()
     own = find(DOMAIN.name, names[DOMAIN.name])
     domain: Domain = built(own, {}, None) if loaded is None else loaded.domain
     wanted = domain.check(Subtask.parse(subtask))

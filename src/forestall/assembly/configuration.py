@@ -8,17 +8,20 @@ anything is built.
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from forestall.assembly.options import checked, plain
+from forestall.assembly.options import built, checked, plain
 from forestall.assembly.registry import TABLES, find, table
+from forestall.domain.model import Domain
+from forestall.domain.toml_out import domain_toml
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.kinds import DOMAIN
-from forestall.tasks.files import load_task
+from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.kind import Kind
 
 SHORT: Mapping[str, tuple[str, str | None]] = {
@@ -183,6 +186,8 @@ class RunConfig:
         without: a part that is left out, one of `WITHOUT`; it stands in the choices, too.
         keep_observations: whether pictures stay in the record.
         final_look: whether the robot looks once more when the plan is finished.
+        domain: that was said, by name or file; None for the task's own. It stands in the choices,
+            too.
     """
 
     task: str
@@ -192,10 +197,20 @@ class RunConfig:
     without: str | None = None
     keep_observations: bool = True
     final_look: bool = False
+    domain: str | None = None
 
     def choice(self, kind: Kind[Any]) -> Choice:
         """The part of a kind."""
         return next(c for c in self.choices if c.kind == kind.name)
+
+    def load(self) -> LoadedTask:
+        """The task, read in the domain that was said, else in its own.
+
+        Raises:
+            InputError: see `load_task`.
+        """
+        said = None if self.domain is None else domain_of(self.choice(DOMAIN))
+        return load_task(self.task, said)
 
     def to_json(self, defaulted: bool = True) -> dict[str, Any]:
         """As it stands in records: what was given, and what was left to defaults.
@@ -210,6 +225,7 @@ class RunConfig:
             "without": self.without,
             "keep_observations": self.keep_observations,
             "final_look": self.final_look,
+            "domain": self.domain,
             "parts": {c.kind: c.to_json(defaulted) for c in self.choices},
         }
 
@@ -234,8 +250,8 @@ def run_config(
         without: a part to leave out, one of `WITHOUT`.
         keep_observations: whether pictures stay in the record.
         final_look: whether the robot looks once more when the plan is finished.
-        given: what was said about parts, in a file or by flags.
-            What is not said is as the task's domain has it, else as the tables have it.
+        given: what was said about parts, in a file or by flags, the domain among them: a name or a
+            file. What is not said is as the run's domain has it, else as the tables have it.
         **named: the same by keyword, over `given`: `strategy="online"`,
             `detector={"name": "objects", "threshold": 0.8}`, or a short name of `SHORT`.
 
@@ -243,15 +259,15 @@ def run_config(
         InputError: a name, an option or a value that is not valid; says what would be.
     """
     said = Given.named(named).over(given or Given())
+    own = said_domain(said, task)
+    other = None if own is None else own.name
     if task:
-        domain = load_task(task).domain
-        same_domain(said, task, domain.name)
+        domain = load_task(task, None if own is None else domain_of(own)).domain
         parts = tuple(part for part in said.parts if part[0] != DOMAIN.name)
         said = Given(parts).over(Given.named(dict(domain.run)))
+        own = own or Choice(DOMAIN.name, domain.name)
     chosen = choices(_ablated(said, without))
-    if task:
-        own = Choice(DOMAIN.name, domain.name)
-        chosen = tuple(own if c.kind == own.kind else c for c in chosen)
+    chosen = tuple(own if own is not None and c.kind == own.kind else c for c in chosen)
     return RunConfig(
         task,
         scenario,
@@ -260,6 +276,7 @@ def run_config(
         without,
         keep_observations,
         final_look,
+        other,
     )
 
 
@@ -290,14 +307,39 @@ def read_file(path: Path) -> tuple[Given, dict[str, Any]]:
     return Given.named(data), run
 
 
-def same_domain(given: Given, task: str, domain: str) -> None:
-    """A task is written in its domain's words, so no run of it can be of another."""
-    for kind, name, _ in given.parts:
-        if kind == DOMAIN.name and name not in (None, domain):
-            raise InputError(
-                f"task {task!r} is of the domain {domain!r}, not {name!r}; "
-                f"a task file names its domain with a line: domain = {name!r}"
-            )
+def said_domain(given: Given, task: str = "") -> Choice | None:
+    """The domain that was said; None where none was, or the task's own by its name.
+
+    Raises:
+        UnknownNameError: no installed domain, no file, and not the task's own.
+    """
+    name = next((name for kind, name, _ in given.parts if kind == DOMAIN.name), None)
+    if name is None:
+        return None
+    try:
+        return given.chosen(DOMAIN.name)
+    except UnknownNameError:
+        if task and load_task(task).domain.name == name:
+            return None
+        raise
+
+
+def domain_of(choice: Choice) -> Domain:
+    """The domain that a choice means, read from its file or built by its factory.
+
+    Raises:
+        InputError: it cannot be read or built, or is no domain.
+    """
+    found = find(choice.kind, choice.name)
+    domain = built(found, dict(choice.given), None)
+    if not isinstance(domain, Domain):
+        raise InputError(f"{found.text} is no domain: it is {type(domain).__name__}")
+    return domain
+
+
+def digest_of(domain: Domain) -> str:
+    """Sixteen hexadecimal digits of what a domain says, the same in every process."""
+    return hashlib.blake2b(domain_toml(domain).encode(), digest_size=8).hexdigest()
 
 
 def _ablated(given: Given, without: str | None) -> Given:

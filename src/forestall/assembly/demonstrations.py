@@ -15,7 +15,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import forestall
-from forestall.assembly.configuration import Choice, Given, RunConfig, run_config
+from forestall.assembly.configuration import Choice, Given, RunConfig, digest_of, run_config
 from forestall.assembly.make import prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
@@ -25,6 +25,7 @@ from forestall.errors import ForestallError
 from forestall.fingerprint import sources_digest, weights_of
 from forestall.kinds import (
     CAPTIONER,
+    DOMAIN,
     IMAGE_ENCODER,
     PERCEIVER,
     SEGMENTER,
@@ -34,7 +35,6 @@ from forestall.kinds import (
 )
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
-from forestall.tasks.files import load_task
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
 from forestall.types.observation import Observation
@@ -58,7 +58,7 @@ class RecordingJob:
     Args:
         task: name or file.
         first_seed: of the range.
-        given: what was said about the parts; only `RECORDED` ones count.
+        given: what was said about the parts; only `RECORDED` ones and the domain count.
         tries: length of the range.
     """
 
@@ -171,7 +171,7 @@ def load_memory(config: RunConfig, workers: int | None = None) -> tuple[list[Dem
     path = memory_path(config) or str(ready_made(config, workers=workers))
     store = config.choice(STORE)
     choice = Choice(store.kind, store.name, (*_but_path(store), ("path", path)))
-    domain = load_task(config.task).domain
+    domain = config.load().domain
     with closing(Assembly([choice], domain).part(STORE)) as opened:
         return list(opened.required()), path
 
@@ -196,8 +196,8 @@ def ready_made(
 
     It holds this task's demonstrations only, so that a first run starts soon and does not depend
     on which other tasks were run before; `forestall demos record` makes larger ones. It is keyed
-    by everything that it could depend on: the sources (command line and pages apart), the task,
-    the parts that it is recorded with.
+    by everything that it could depend on: the sources (command line and pages apart), the task and
+    the content of its domain, the parts that it is recorded with.
 
     Args:
         config: of a run that wants it.
@@ -205,19 +205,19 @@ def ready_made(
         progress: told (done, total, what).
         workers: processes; all cores by default.
     """
-    loaded = load_task(config.task)
+    loaded = config.load()
     name = loaded.task.name
     parts = [(c.kind, c.name, sorted(c.options.items())) for c in config.choices]
     parts = [p for p in parts if p[0] in RECORDED]
     weights = weights_of(p[1] for p in parts)
-    key = sources_digest(
-        [forestall.__version__, KITCHENS_PER_TASK, TRIES, repr(loaded), parts, weights]
-    )
+    inputs = [loaded.task, digest_of(loaded.domain), parts, weights]
+    key = sources_digest([forestall.__version__, KITCHENS_PER_TASK, TRIES, *inputs])
     path = cache_dir() / "memory" / f"{name}-{key}.db"
     if path.exists():
         return path
-    given = Given.of({c.kind: (c.name, dict(c.given)) for c in config.choices})
-    jobs = jobs_for([config.task], given=_recorded(given))
+    own = DOMAIN.name if config.domain is None else ""
+    said = {c.kind: (c.name, dict(c.given)) for c in config.choices if c.kind != own}
+    jobs = jobs_for([config.task], given=_recorded(Given.of(said)))
     if announce is not None:
         announce(
             f"first use of {name}: recording {len(jobs)} demonstrations (once; kept in {path})"
@@ -236,5 +236,5 @@ def ready_made(
 
 
 def _recorded(given: Given) -> Given:
-    """What was said about parts that a demonstration depends on."""
-    return Given(tuple(part for part in given.parts if part[0] in RECORDED))
+    """What was said about parts that a demonstration depends on, and of its domain."""
+    return Given(tuple(part for part in given.parts if part[0] in (*RECORDED, DOMAIN.name)))

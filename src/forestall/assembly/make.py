@@ -15,7 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import forestall
-from forestall.assembly.configuration import RunConfig
+from forestall.assembly.configuration import RunConfig, digest_of
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import known
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
@@ -31,7 +31,7 @@ from forestall.tasks.faults import (
     check_steps,
     wrap,
 )
-from forestall.tasks.files import LoadedTask, Scenario, load_scenario, load_task
+from forestall.tasks.files import LoadedTask, Scenario, load_scenario
 from forestall.tasks.goals import TruthGoalChecker, irreversible
 from forestall.tasks.truth import TruthTrace
 from forestall.types.demonstration import Demonstration
@@ -73,7 +73,7 @@ def prepare(config: RunConfig) -> Prepared:
     Raises:
         InputError: anything that does not fit, each with what would be valid.
     """
-    loaded = load_task(config.task)
+    loaded = config.load()
     if config.choice(STATES).name == STORED_STATES:
         of_runs = [n for n in known(STATES.name) if n != STORED_STATES]
         raise UnknownNameError("states of a run", STORED_STATES, of_runs)
@@ -153,7 +153,14 @@ def run_episode(
                 *provenance(prepared.config),
                 ("memory", memory),
                 ("demonstrations", [{"id": d.id, "seed": d.seed} for d in demonstrations or ()]),
-                ("inputs", {"task": repr(loaded.task), "scenario": repr(prepared.scenario)}),
+                (
+                    "inputs",
+                    {
+                        "task": repr(loaded.task),
+                        "scenario": repr(prepared.scenario),
+                        "domain": digest_of(loaded.domain),
+                    },
+                ),
             ),
         )
 

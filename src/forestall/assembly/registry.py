@@ -15,11 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points, packages_distributions
 from typing import Any
 
 from forestall import kinds
+from forestall.domain.load import load_domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.kind import Kind
 
@@ -193,7 +195,7 @@ def known(kind: str) -> tuple[str, ...]:
 
 
 def find(kind: str, name: str) -> Found:
-    """The factory behind a name, or behind "module:attribute".
+    """The factory behind a name, behind "module:attribute", or behind the file of a domain.
 
     Raises:
         UnknownNameError: no such name.
@@ -208,6 +210,8 @@ def find(kind: str, name: str) -> Found:
     for entry in _entries(kind):
         if entry.name == name:
             target, package = entry.value, _package(entry)
+    if kind == kinds.DOMAIN.name and name.endswith((".toml", ".pddl")):
+        return Found(kind, name, _domain_file(name), None)
     if ":" not in target:
         raise UnknownNameError(kind, name, known(kind))
     package = package or _owner(target)
@@ -222,6 +226,14 @@ def find(kind: str, name: str) -> Found:
 
 def _entries(kind: str) -> tuple[EntryPoint, ...]:
     return tuple(entry_points(group=f"forestall.{kind}"))
+
+
+@cache
+def _domain_file(path: str) -> Callable[..., Any]:
+    def read() -> Any:
+        return load_domain(path)
+
+    return read
 
 
 def _imported(target: str) -> Callable[..., Any]:

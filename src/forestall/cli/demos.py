@@ -49,12 +49,13 @@ def record(
         jobs: how many processes; all cores by default.
         quiet: no progress bar.
     """
+    from forestall.assembly.configuration import run_config
     from forestall.assembly.demonstrations import KITCHENS_PER_TASK, jobs_for, record_all
     from forestall.cli.progress import bar
     from forestall.config import DEMONSTRATION_SEEDS
     from forestall.errors import InputError
     from forestall.memory.store import open_store
-    from forestall.tasks.files import load_task, task_names
+    from forestall.tasks.files import task_names
 
     kitchens = KITCHENS_PER_TASK if kitchens is None else kitchens
     first = DEMONSTRATION_SEEDS if seed is None else seed
@@ -62,10 +63,10 @@ def record(
         raise InputError(f"--kitchens {kitchens}: at least 1 is needed")
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs {jobs}: at least 1 is needed")
-    names = task or list(task_names())
+    given, names = parts.given(), task or list(task_names())
     for name in names:
-        load_task(name)
-    todo = jobs_for(names, kitchens, first, parts.given())
+        run_config(name, given=given)
+    todo = jobs_for(names, kitchens, first, given)
     for job in todo[:1]:
         job.config(first)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:

@@ -30,6 +30,7 @@ class SeeingFlags:
 
     Args:
         world: where the robot acts: a name, or package.module:Class.
+        domain: what the task is read in: a name, or a file (.toml, .pddl); its own by default.
         states: where object states come from: learned (pixels, by the shipped encoder), clip
             (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
         feature: what a node's feature encodes: text, parts (category and states) or image.
@@ -42,6 +43,7 @@ class SeeingFlags:
     """
 
     world: str | None = None
+    domain: str | None = None
     states: str | None = None
     feature: str | None = None
     renderer: str | None = None

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from forestall.assembly.configuration import run_config
+from forestall.assembly.configuration import digest_of, run_config
 from forestall.assembly.demonstrations import memory_path, ready_made
 from forestall.assembly.make import needs_memory, prepare
+from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.experiments.engines import WorkerDiedError, check_engine, computed, make_lanes
 from forestall.experiments.folder import EXPERIMENT, About, ResultsFolder, episodes_in
@@ -37,8 +38,8 @@ class Wanted(Protocol):
     def runs(self) -> Sequence[Run]:
         """Each once; those of one case after its watched run."""
 
-    def about(self) -> Mapping[str, Any]:
-        """What all of them have in common, as JSON has it."""
+    def about(self, domain: Domain | None = None) -> Mapping[str, Any]:
+        """What all of them have in common, as JSON has it, when read in another domain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,12 @@ class Experiment:
     def about(self) -> About:
         """What all its rows have in common: settings, code, and the content of a given memory."""
         memory = memory_path(run_config("", given=self.settings.given))
-        what = {**self.choice.about(), "settings": self.settings.to_json()}
+        domain = self.settings.domain()
+        what = {
+            **self.choice.about(domain),
+            "content of the domain": None if domain is None else digest_of(domain),
+            "settings": self.settings.to_json(),
+        }
         return About.now(self.kind, what, memory)
 
 
@@ -153,7 +159,7 @@ def _computed(
     with folder.writing() as lines:
         for work, answer in computed(groups, lanes, compute, spared):
             row = (
-                broken_row(work.run, str(answer))
+                broken_row(work.run, str(answer), prepare(config_of(work.run, work.settings)))
                 if isinstance(answer, WorkerDiedError)
                 else EpisodeRow.from_json(answer)
             )

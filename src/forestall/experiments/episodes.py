@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from forestall.assembly.configuration import digest_of
 from forestall.config import DEMONSTRATION_SEEDS
+from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.experiments.conduct import Experiment, Progress, check, conduct
 from forestall.experiments.runs import Run
@@ -59,10 +61,15 @@ class Episodes:
         ]
         return tuple(dict.fromkeys(found))
 
-    def about(self) -> dict[str, Any]:
-        """The content of files of one's own; other episodes may share a folder otherwise."""
-        shipped = {*task_names(), *scenario_names()}
-        read = {t: repr(load_task(t)) for t in self.tasks}
+    def about(self, domain: Domain | None = None) -> dict[str, Any]:
+        """The content of files of one's own; other episodes may share a folder otherwise.
+
+        Args:
+            domain: that the tasks are read in, None for their own.
+        """
+        shipped = {*task_names(None), *scenario_names(domain=None)}
+        loaded = {t: load_task(t, domain) for t in self.tasks}
+        read = {t: f"{one.task} {digest_of(one.domain)}" for t, one in loaded.items()}
         read |= {s: repr(load_scenario(s)) for s in self.scenarios}
         digests = {
             name: hashlib.blake2b(text.encode(), digest_size=8).hexdigest()

@@ -13,8 +13,9 @@ from functools import cache
 from typing import Any
 
 from forestall.assembly.configuration import Choice as Part
-from forestall.assembly.configuration import Given, choices
+from forestall.assembly.configuration import Given, choices, domain_of, said_domain
 from forestall.assembly.registry import find
+from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, STRATEGY
 from forestall.statistics.cases import CASE_SETS, UNDISTURBED, Case, cases
@@ -57,6 +58,15 @@ class Settings:
             if kind in OWN:
                 raise InputError(f"an experiment chooses the {kind} of each run by itself")
         return tuple(part for part in choices(self.given) if part.kind not in OWN)
+
+    def domain(self) -> Domain | None:
+        """The domain that every task is read in, None for their own.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        said = said_domain(self.given)
+        return None if said is None else domain_of(said)
 
     def to_json(self) -> dict[str, Any]:
         """As it stands in the folder of the results."""
@@ -117,8 +127,8 @@ class Choice:
         """See `runs_for`."""
         return runs_for(self)
 
-    def about(self) -> dict[str, Any]:
-        """What all its episodes have in common, with others of the same folder."""
+    def about(self, domain: Domain | None = None) -> dict[str, Any]:
+        """What all its episodes have in common, with others of the same folder, in any domain."""
         return {"split": self.split, "rounds": self.rounds}
 
     def takes(self, run: Run) -> bool:

@@ -77,9 +77,8 @@ def run_one(work: Work) -> dict[str, Any]:
         return broken_row(run, f"{type(error).__name__}: {error}", prepared).to_json()
 
 
-def broken_row(run: Run, error: str, prepared: Prepared | None = None) -> EpisodeRow:
+def broken_row(run: Run, error: str, prepared: Prepared) -> EpisodeRow:
     """The row of an episode that did not come to an end."""
-    prepared = prepared or prepare(config_of(run, Settings()))
     return EpisodeRow(
         **_identity(run, prepared),
         success=False,

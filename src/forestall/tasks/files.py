@@ -9,7 +9,7 @@ are checked against the domain when loaded.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -130,16 +130,24 @@ def scenario_names(of: str | None = None, domain: str | None = DEFAULT_DOMAIN) -
     )
 
 
-def load_task(name_or_file: str) -> LoadedTask:
+def load_task(name_or_file: str, domain: Domain | None = None) -> LoadedTask:
     """A shipped task by name, or any task file by path.
+
+    Args:
+        name_or_file: of the task.
+        domain: what to read it in, in the place of the domain that it names.
 
     Raises:
         UnknownNameError: neither a shipped task nor a file.
         FileFormatError: the file is not TOML or has a wrong field.
         InputError: it speaks of a skill, category, attribute or value that is not known.
     """
-    source, text, domain = _read("tasks", "task", name_or_file)
-    return _task(source, _validated(TaskFile, source, text), domain)
+    source, text, own = _read("tasks", "task", name_or_file)
+    data = _validated(TaskFile, source, text)
+    if domain is None:
+        return _task(source, data, lambda: load_domain(_beside(source, data.domain or own)))
+    other = f"{source} does not fit the domain {domain.name!r}"
+    return _task(other, data, lambda: domain)
 
 
 def load_scenario(name_or_file: str) -> Scenario:
@@ -245,9 +253,9 @@ def _validated(model: type[M], source: str, text: str) -> M:
         raise FileFormatError(f"{source}: {problems}") from error
 
 
-def _task(source: str, data: TaskFile, of: str) -> LoadedTask:
+def _task(source: str, data: TaskFile, read_in: Callable[[], Domain]) -> LoadedTask:
     try:
-        domain = _domain(data, _beside(source, data.domain or of))
+        domain = _extended(read_in(), data)
         goal = _goal(data.goal, domain)
         plan = domain.check_plan(Plan.parse(data.plan, data.goal.text))
         for subtask in plan:
@@ -265,10 +273,10 @@ def _beside(source: str, name: str) -> str:
     return str(Path(source).parent / name) if name.endswith((".toml", ".pddl")) else name
 
 
-def _domain(data: TaskFile, name: str) -> Domain:
+def _extended(domain: Domain, data: TaskFile) -> Domain:
     """The task's domain with what the file adds to it."""
     attributes = {n: t.model_dump(exclude_none=True) for n, t in data.attributes.items()}
-    return extend(load_domain(name), data.categories, attributes)
+    return extend(domain, data.categories, attributes)
 
 
 def _goal(data: GoalFile, domain: Domain) -> Goal:
