@@ -190,7 +190,8 @@ def test_a_stored_observation_is_judged(
         codes[name] = call(arguments)
         data = json.loads(capsys.readouterr().out)
     assert codes == {"fine": 0, "full": 1}
-    assert data["decision"] == "replan" and "Bowl-1" in data["cause"]
+    assert data["outcome"] == "replan" and "Bowl-1" in data["scenes"][0]["cause"]
+    assert "put_in(Plate-1, Microwave-1)" in data["scenes"][0]["replan"]["plan"]
     assert call(["check", str(tmp_path / "absent"), *options, "--memory", str(memory)]) == 2
     assert "absent" in capsys.readouterr().err
     assert call(["check", str(tmp_path / "fine"), "--subtask", "put_in(Plate, Microwave)"]) == 2

@@ -22,7 +22,7 @@ from forestall.assembly.make import make_world, needs_memory, prepare, run_episo
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.load import shipped
-from forestall.errors import InputError, MemoryFileError, UnknownNameError
+from forestall.errors import InputError, MemoryFileError
 from forestall.kinds import WORLD
 
 PLAIN = Given.named(
@@ -137,12 +137,3 @@ def test_parts_are_listed_with_their_options(capsys: pytest.CaptureFixture[str])
     assert json.loads(capsys.readouterr().out)["world"]["kitchen"] == {"renderer": "auto"}
     assert call(["parts", "detectors"]) == 2
     assert "did you mean detector" in capsys.readouterr().err
-
-
-def test_the_truth_judges_no_stored_observation(tmp_path: Path) -> None:
-    from forestall.assembly.checking import judge_stored
-
-    with pytest.raises(UnknownNameError, match="states of a stored observation"):
-        judge_stored(
-            tmp_path, "put_in(Plate, Microwave)", None, [], Given.named({"states": "oracle"})
-        )

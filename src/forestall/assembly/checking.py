@@ -1,91 +1,296 @@
-"""Judging a stored observation of the user's own (no simulator, nothing is executed).
+"""Judging scenes of the user's own: nothing is simulated, and nothing is executed.
 
-Calls: command line → here → parts, perception. Composition like `make`, for `forestall check`.
+Calls: command line → here → stored, parts, monitor. A monitor is asked before the subtasks of the
+plan one after the other, or before the same one each time; a corrected plan is proposed and never
+followed. Composition like `make`, for `forestall check`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from forestall.assembly.configuration import Given, choices, run_config
-from forestall.assembly.make import STORED_STATES
-from forestall.assembly.options import built
+from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
+from forestall.assembly.make import STORED_STATES, provenance
 from forestall.assembly.parts import Assembly
-from forestall.assembly.registry import find, known
+from forestall.assembly.registry import known
+from forestall.assembly.stored import Stored, is_graph, read_scene, scenes_in
+from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
-from forestall.domain.names import ground_subtask
-from forestall.errors import UnknownNameError
-from forestall.kinds import DETECTOR, DOMAIN, PERCEIVER, REASONER, RETRIEVER, STATES
-from forestall.perception.folder import read_observation
+from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.kinds import PERCEIVER, STATES, STRATEGY
+from forestall.monitor import Monitor
+from forestall.seams import Strategy
+from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.demonstration import Demonstration
-from forestall.types.graph import SceneGraph
-from forestall.types.plan import Plan, Subtask
-from forestall.types.runtime import BoundaryContext
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeEnd,
+    EpisodeRecord,
+    ExecutedRecord,
+    SkillOutcome,
+    SkillStatus,
+)
+from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
-from forestall.types.verdict import Decision, Diagnosis, Verdict
+from forestall.types.verdict import Decision
 
 TRUTH_STATES = "oracle"
 """The simulator's own, which no stored observation has."""
 
-DEFAULTS = Given.named({"segmenter": "given-masks", "states": STORED_STATES})
-"""What a stored observation brings with it: its masks and, if nothing else reads them, states."""
+STORED = "stored observations"
+"""What stands in the record in the place of a scenario."""
+
+ATTEMPTS = "max_attempts"
+"""Option of a strategy that gives up after so many repairs of one cause; here none is tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """Before what the scenes are judged.
+
+    Args:
+        subtask: in text form: the same one for every scene. None: the plan's, one after the other.
+        plan: "step; step", or the path of a file with one step a line; the task's by default.
+        task: name or file; its own demonstrations are preferred, and its goal is kept.
+    """
+
+    subtask: str | None = None
+    plan: str | None = None
+    task: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """One scene and what the monitor says; "replan" where a corrected plan is proposed."""
+
+    path: Path
+    decision: MonitorDecision
+    record: BoundaryRecord
+
+    @property
+    def judged(self) -> bool:
+        """Whether something was judged: to the good, or to an alarm."""
+        held = self.decision.hold in (Hold.SENSES, Hold.INTERNAL)
+        return not held and self.decision.outcome not in (Outcome.LOOK, Outcome.NOT_JUDGED)
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the subtask should not start."""
+        return self.judged and self.decision.outcome is not Outcome.PROCEED
+
+
+@dataclass(frozen=True, slots=True)
+class Judgements:
+    """Every scene's, and the record from which the page is drawn."""
+
+    each: tuple[Judgement, ...]
+    record: EpisodeRecord
+
+    @property
+    def outcome(self) -> Outcome:
+        """Of all: the first alarm, else the first that was not judged, else "proceed"."""
+        alarms = [j for j in self.each if j.alarm]
+        unclear = [j for j in self.each if not j.judged]
+        return (*alarms, *unclear, *self.each)[0].decision.outcome
 
 
 def judge_stored(
-    folder: Path,
-    subtask: str,
-    task: str | None,
+    paths: Sequence[Path],
+    question: Question,
     demonstrations: Sequence[Demonstration],
     given: Given | None = None,
-) -> tuple[SceneGraph, Verdict, Diagnosis | None]:
-    """The scoped graph, the verdict, and on an alarm the diagnosis.
+    memory: str | None = None,
+    pictures: bool = False,
+) -> Judgements:
+    """Judge scenes in their order.
 
     Args:
-        folder: the observation, see docs/observation-format.md.
-        subtask: in text form.
-        task: name or file of the task; its own demonstrations are preferred.
+        paths: observation folders (docs/observation-format.md), graph files, or folders that hold
+            numbered ones.
+        question: before what.
         demonstrations: the memory.
         given: what was said about parts: the detector's threshold, what reads states off pictures.
+        memory: where the demonstrations come from, for the record.
+        pictures: whether they stay in the record.
 
     Raises:
-        InputError: a name, the observation or the subtask is not valid.
+        InputError: a name, a scene, the subtask or the plan is not valid.
     """
-    chosen = choices((given or Given()).over(DEFAULTS))
-    names = {c.kind: c.name for c in chosen}
-    if names[STATES.name] == TRUTH_STATES:
+    scenes = scenes_in(paths)
+    if not scenes:
+        raise InputError("nothing to judge: give an observation folder or a graph file")
+    config = _config(question, given or Given(), all(map(is_graph, scenes)))
+    task, domain = _task(question, config, demonstrations)
+    wanted = None if question.subtask is None else Subtask.parse(question.subtask)
+    if wanted is None and len(scenes) > len(task.plan):
+        raise InputError(
+            f"{len(scenes)} scenes for the {len(task.plan)} subtasks of the plan: give one for "
+            "each at most, or --subtask to judge all before the same one"
+        )
+    stated: dict[str, Mapping[str, str]] = {}
+    parts = Assembly(config.choices, domain, demonstrations, {"states": stated})
+    bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
+    strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)
+    monitor = Monitor(strategy, domain, perceiver, bounds)
+    monitor.start(task)
+    found: list[Judgement] = []
+    passed: list[ExecutedRecord] = []
+    for path in scenes:
+        stored = read_scene(path, domain)
+        stated.clear()
+        stated.update(stored.states)
+        if found and wanted is None:
+            passed.append(_passed(monitor, found[-1].record, stored))
+        found.append(_judgement(path, monitor.before(stored.scene, wanted), pictures))
+    record = EpisodeRecord(
+        task=task,
+        scenario=STORED,
+        strategy=strategy.name,
+        seed=config.seed,
+        initial_plan=_from(task.plan, wanted),
+        boundaries=tuple(j.record for j in found),
+        executed=tuple(passed),
+        end=EpisodeEnd.UNFINISHED,
+        simulated_s=sum(e.outcome.duration_s for e in passed),
+        compute_s=monitor.seconds,
+        provenance=(
+            *((name, value) for name, value in provenance(config) if name != "loop"),
+            ("perception", dict(perceiver.describe())),
+            ("memory", memory),
+            ("observations", [str(path) for path in scenes]),
+            ("inputs", {"task": repr(task), "domain": digest_of(domain)}),
+        ),
+    )
+    return Judgements(tuple(found), record)
+
+
+def _config(question: Question, given: Given, graphs: bool) -> RunConfig:
+    """What a stored scene brings with it, its masks and states, and over it what was said."""
+    own = {
+        "segmenter": "given-masks",
+        "states": STORED_STATES,
+        "perceiver": "given-graph" if graphs else "graph",
+    }
+    config = run_config(question.task or "", given=given.over(Given.named(own)))
+    if config.choice(STATES).name == TRUTH_STATES:
         readable = [n for n in known(STATES.name) if n != TRUTH_STATES]
         raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)
-    loaded = None if task is None else run_config(task, given=given).load()
-    own = find(DOMAIN.name, names[DOMAIN.name])
-    domain: Domain = built(own, {}, None) if loaded is None else loaded.domain
-    wanted = domain.check(Subtask.parse(subtask))
-    for name in wanted.args:
+    return config
+
+
+def _task(
+    question: Question, config: RunConfig, demonstrations: Sequence[Demonstration]
+) -> tuple[Task, Domain]:
+    """The task with the plan at hand, and its domain.
+
+    A plan of no task is of the one that all demonstrations are of, if there is one. A subtask that
+    the task's own plan does not have is judged alone, without the task's goal.
+    """
+    if question.task is None:
+        domain = config.load_domain()
+        title = f"before {question.subtask}" if question.subtask else "a plan"
+        shown = {d.task for d in demonstrations}
+        name = shown.pop() if question.plan is not None and len(shown) == 1 else ""
+        task = Task(name, title, Goal(""), Plan(()), SceneNeeds(), domain.name)
+    else:
+        loaded = config.load()
+        task, domain = loaded.task, loaded.domain
+    if question.plan is not None:
+        task = replace(task, plan=replace(read_plan(question.plan, domain), goal=task.goal.text))
+    if question.subtask is None:
+        if not len(task.plan):
+            raise InputError("say before what: --subtask STEP, --plan 'STEP; STEP' or --task NAME")
+        return task, domain
+    wanted = _fitting(Subtask.parse(question.subtask), domain)
+    if not any(same_step(step, wanted) for step in task.plan):
+        if question.plan is not None:
+            raise UnknownNameError("step of the plan", str(wanted), task.plan.texts())
+        task = replace(task, goal=Goal(""), plan=Plan((wanted,)))
+    return task, domain
+
+
+def read_plan(text_or_file: str, domain: Domain) -> Plan:
+    """A plan of "step; step", or of a file with one step a line; "#" begins a comment.
+
+    Raises:
+        FileFormatError: the file cannot be read.
+        InputError: no step, or one that does not fit the domain, by its number.
+    """
+    text, source = text_or_file, "--plan"
+    if "(" not in text_or_file:
+        source = text_or_file
+        try:
+            text = Path(text_or_file).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError, ValueError) as error:
+            raise FileFormatError(
+                f"cannot read plan {text_or_file}: {error}; give a file with one step a line, "
+                "or the steps: 'skill(Thing); skill(Thing, Place)'"
+            ) from error
+    lines = (line.partition("#")[0] for line in text.splitlines())
+    steps = [step.strip() for line in lines for step in re.split(";", line) if step.strip()]
+    if not steps:
+        raise InputError(f"{source}: the plan has no step")
+    plan = []
+    for number, step in enumerate(steps, 1):
+        try:
+            plan.append(_fitting(Subtask.parse(step), domain))
+        except InputError as error:
+            raise InputError(f"{source}: step {number}: {error}") from error
+    return Plan(tuple(plan))
+
+
+def _fitting(subtask: Subtask, domain: Domain) -> Subtask:
+    domain.check(subtask)
+    for name in subtask.args:
         domain[name]
-    observation, stated = read_observation(folder, domain)
-    parts = Assembly(chosen, domain, demonstrations, {"states": stated})
-    perceiver = parts.part(PERCEIVER)
-    graph = perceiver.perceive(observation)
-    ground = ground_subtask(wanted, graph, domain, observation.robot_position_world_m, {})
-    scoped = perceiver.scope(graph, ground)
-    name = "" if loaded is None else loaded.task.name
-    steps = () if loaded is None else loaded.task.plan.subtasks
-    done = steps.index(wanted) if wanted in steps else 0
-    references = tuple(parts.part(RETRIEVER).retrieve(ground, name, done))
-    verdict = parts.part(DETECTOR).judge(scoped, observation, references)
-    if verdict.decision is Decision.PROCEED:
-        return scoped, verdict, None
-    plan = Plan((wanted,))
-    context = BoundaryContext(
-        task=loaded.task if loaded is not None else Task(name, name, Goal(""), plan, SceneNeeds()),
-        plan=plan,
-        index=0,
-        done=done,
-        subtask=ground,
-        graph=graph,
-        scoped=scoped,
-        observation=observation,
-        references=references,
-    )
-    return scoped, verdict, parts.part(REASONER).diagnose(context, verdict)
+    return subtask
+
+
+def _strategy(parts: Assembly, scenes: int) -> Strategy:
+    """The strategy that was chosen; as no repair is tried, it gives none up."""
+    name = parts.name(STRATEGY)
+    options: dict[str, Any] = {}
+    if ATTEMPTS in parts.declared(STRATEGY, name):
+        options = {**parts.given(STRATEGY), ATTEMPTS: scenes}
+    return parts.part(STRATEGY, name, **options) if options else parts.part(STRATEGY)
+
+
+def _passed(monitor: Monitor, last: BoundaryRecord, following: Stored) -> ExecutedRecord:
+    """The subtask before which was judged last lies between two scenes: it is over."""
+    lasted = max(0.0, following.time_s - last.time_s)
+    done = SkillOutcome(SkillStatus.SUCCEEDED, lasted)
+    monitor.after(done)
+    return ExecutedRecord(last.subtask, done, last.index)
+
+
+def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgement:
+    """What is kept of a decision.
+
+    A plan that may not be adopted is one that is proposed. An alarm that wants another look before
+    it gives up on a plan holds: here nobody looks.
+    """
+    record, replan, verdict = decision.record, decision.replan, decision.verdict
+    assert record is not None, "what was looked at is recorded"
+    cause = "" if decision.diagnosis is None else decision.diagnosis.cause
+    if decision.hold is Hold.REPLAN_LIMIT and replan is not None:
+        decision = replace(decision, outcome=Outcome.REPLAN, hold=None, plan=replan.plan, why=cause)
+    elif decision.outcome is Outcome.LOOK and verdict and verdict.decision is Decision.REPLAN:
+        why = f"no corrected plan was found: {decision.why}"
+        decision = replace(decision, outcome=Outcome.HOLD, hold=Hold.ALARM, why=why)
+    record = replace(record, outcome=decision.outcome)
+    if not pictures:
+        record = replace(record, observation=None)
+    return Judgement(path, replace(decision, context=None, record=None), record)
+
+
+def _from(plan: Plan, wanted: Subtask | None) -> Plan:
+    """What is left of a plan from a step on."""
+    if wanted is None:
+        return plan
+    first = next(i for i, step in enumerate(plan) if same_step(step, wanted))
+    return replace(plan, subtasks=plan.subtasks[first:])

@@ -212,6 +212,10 @@ class RunConfig:
         said = None if self.domain is None else domain_of(self.choice(DOMAIN))
         return load_task(self.task, said)
 
+    def load_domain(self) -> Domain:
+        """The domain of the task; where there is none, the one that was said or the default."""
+        return self.load().domain if self.task else domain_of(self.choice(DOMAIN))
+
     def to_json(self, defaulted: bool = True) -> dict[str, Any]:
         """As it stands in records: what was given, and what was left to defaults.
 

@@ -171,7 +171,7 @@ def load_memory(config: RunConfig, workers: int | None = None) -> tuple[list[Dem
     path = memory_path(config) or str(ready_made(config, workers=workers))
     store = config.choice(STORE)
     choice = Choice(store.kind, store.name, (*_but_path(store), ("path", path)))
-    domain = config.load().domain
+    domain = config.load_domain()
     with closing(Assembly([choice], domain).part(STORE)) as opened:
         return list(opened.required()), path
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,28 +13,11 @@ from forestall.cli.flags import RunFlags, Settings
 from forestall.config import DEFAULT_DOMAIN
 
 if TYPE_CHECKING:
-    from forestall.types.graph import SceneGraph
-    from forestall.types.verdict import Diagnosis, Verdict
+    from forestall.assembly.checking import Judgement, Judgements
+    from forestall.types.decision import MonitorDecision
+    from forestall.types.verdict import Replan, Verdict
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
-
-
-def read_graph(path: Path) -> SceneGraph:
-    """A scene graph from a JSON file.
-
-    Raises:
-        FileFormatError: it cannot be read, or is no scene graph.
-        InputError: it contradicts itself (a dangling relation, an id twice).
-    """
-    from forestall.errors import FileFormatError, InputError
-    from forestall.types.graph import SceneGraph
-
-    try:
-        return SceneGraph.from_json(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise FileFormatError(f"cannot read scene graph {path}: {error}") from error
-    except InputError as error:
-        raise type(error)(f"{path}: {error}") from error
 
 
 def compare(
@@ -48,6 +31,7 @@ def compare(
         domain: of both graphs, by name or file.
         as_json: print JSON.
     """
+    from forestall.assembly.stored import read_graph
     from forestall.comparison.score import ScoreConfig
     from forestall.comparison.score import compare as compare_graphs
     from forestall.domain.load import load_domain
@@ -88,28 +72,35 @@ def compare(
 
 
 def check(
-    folder: Path,
-    /,
-    *,
-    subtask: str,
+    *scenes: Path,
+    subtask: str | None = None,
+    plan: str | None = None,
     task: str | None = None,
+    page: Path | None = None,
     memory: Path | None = None,
+    domain: str | None = None,
     threshold: float | None = None,
     states: str | None = None,
     config: Path | None = None,
     settings: Settings = None,
     as_json: Json = False,
 ) -> int:
-    """Judge a stored observation of your own before a subtask.
+    """Judge stored observations or scene graphs of your own, each before a subtask.
 
-    Exit code 0: it fits; 1: an alarm; 4: it could not be judged (no demonstration to compare with,
-    or something that is needed is not in view).
+    Exit code 0: every one may proceed; 1: an alarm, with its cause and, where one is found, a
+    corrected plan that was checked; 2: the input is not valid; 4: one could not be judged (no
+    demonstration to compare with, or something that is needed was not seen).
 
     Args:
-        folder: the observation (docs/observation-format.md).
-        subtask: what is about to start, e.g. "put_in(Plate, Microwave)".
+        scenes: observation folders (docs/observation-format.md), scene graphs (.json), or folders
+            that hold numbered ones; judged in this order.
+        subtask: what is about to start, e.g. "put_in(Plate, Microwave)". Without it the scenes are
+            judged before the subtasks of the plan, one after the other.
+        plan: "STEP; STEP", or a file with one step a line; the task's by default.
         task: the task's name, so that its own demonstrations are preferred.
+        page: an HTML file to write about it.
         memory: a demonstration file; the ready-made one of the task by default.
+        domain: what everything is read in: a name, or a file (.toml, .pddl); the task's by default.
         threshold: alarm when no demonstration reaches this score.
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
@@ -117,69 +108,147 @@ def check(
             --set detector.threshold=0.85.
         as_json: print JSON.
     """
-    from forestall.assembly.checking import judge_stored
+    from forestall.assembly.checking import Question, judge_stored
     from forestall.assembly.configuration import Given, run_config
     from forestall.assembly.demonstrations import memory_path
     from forestall.cli.demos import memory_of
     from forestall.errors import InputError
     from forestall.kinds import STATES
-    from forestall.types.verdict import Decision
+    from forestall.report.page import write_page
 
-    flags = RunFlags(
-        threshold=threshold, states=states, memory=memory, config=config, settings=settings
-    )
-    given = flags.given()
+    given = RunFlags(
+        threshold=threshold,
+        states=states,
+        memory=memory,
+        domain=domain,
+        config=config,
+        settings=settings,
+    ).given()
     remembering = Given(tuple(part for part in given.parts if part[0] != STATES.name))
     wanted = run_config(task or "", given=remembering)
     if task is None and memory_path(wanted) is None:
         raise InputError("give --memory FILE, or --task NAME to compare with its ready-made memory")
     demonstrations, path = memory_of(wanted, as_json)
-    started = time.perf_counter()
-    graph, verdict, diagnosis = judge_stored(folder, subtask, task, demonstrations, given)
-    data = _verdict_json(verdict, diagnosis) | {
-        "subtask": str(graph.subtask),
-        "memory": path,
-        "graph": graph.to_json(),
-        "compute_s": time.perf_counter() - started,
-    }
+    question = Question(subtask, plan, task)
+    found = judge_stored(scenes, question, demonstrations, given, path, page is not None)
+    if page is not None:
+        write_page(found.record, page)
     if as_json:
-        print(json.dumps(data, indent=2))
+        print(json.dumps(_judgements_json(found, path, page), indent=2))
     else:
-        judged = "not judged" if verdict.score is None else verdict.decision.value
-        print(f"{judged}: before {graph.subtask}")
-        score = "none" if verdict.score is None else f"{verdict.score:.3f}"
-        print(
-            f"  score {score}, threshold {verdict.threshold:.2f}, {verdict.references} references"
-        )
-        if verdict.note:
-            print(f"  {verdict.note}")
-        for d in verdict.discrepancies:
-            print(f"  {d.change.value}: {d.text}")
-        if diagnosis is not None:
-            print(f"  cause: {diagnosis.cause}")
-            for fact in diagnosis.must_change:
-                print(f"  must change: {fact}")
-    if verdict.decision is Decision.REPLAN:
+        _tell(found, page)
+    return _code(found)
+
+
+def _code(found: Judgements) -> int:
+    if any(j.alarm for j in found.each):
         return 1
-    return 0 if verdict.decision is Decision.PROCEED and verdict.score is not None else 4
+    return 0 if all(j.judged for j in found.each) else 4
 
 
-def _verdict_json(verdict: Verdict, diagnosis: Diagnosis | None) -> dict[str, Any]:
+def _judgements_json(found: Judgements, memory: str, page: Path | None) -> dict[str, Any]:
+    record = found.record
+    return {
+        "outcome": found.outcome.value,
+        "task": record.task.name or None,
+        "domain": record.task.domain,
+        "plan": record.initial_plan.texts(),
+        "memory": memory,
+        "page": None if page is None else str(page),
+        "scenes": [_judgement_json(j) for j in found.each],
+    }
+
+
+def _judgement_json(judgement: Judgement) -> dict[str, Any]:
+    decision, record = judgement.decision, judgement.record
+    verdict, diagnosis, replan = decision.verdict, decision.diagnosis, decision.replan
+    return {
+        "scene": str(judgement.path),
+        "subtask": str(record.subtask),
+        "outcome": decision.outcome.value,
+        "why": decision.why,
+        "hold": None if decision.hold is None else decision.hold.value,
+        "look_at": [list(point) for point in decision.look_at],
+        "verdict": None if verdict is None else _verdict_json(verdict),
+        "cause": None if diagnosis is None else diagnosis.cause,
+        "must_change": [] if diagnosis is None else [str(f) for f in diagnosis.must_change],
+        "culprits": [] if diagnosis is None else list(diagnosis.culprits),
+        "replan": None if replan is None else _replan_json(replan),
+        "graph": record.scoped.to_json(),
+        "compute_s": sum(seconds for _, seconds in decision.seconds),
+    }
+
+
+def _verdict_json(verdict: Verdict) -> dict[str, Any]:
+    nearest = verdict.nearest
     return {
         "decision": verdict.decision.value,
+        "detector": verdict.detector,
         "score": verdict.score,
         "threshold": verdict.threshold,
         "calibration": verdict.calibration.value,
         "references": verdict.references,
         "nearest": None
-        if verdict.nearest is None
+        if nearest is None
         else {
-            "demonstration": verdict.nearest.demonstration,
-            "task": verdict.nearest.task,
-            "subtask": str(verdict.nearest.subtask),
+            "demonstration": nearest.demonstration,
+            "task": nearest.task,
+            "subtask": str(nearest.subtask),
         },
         "discrepancies": [d.text for d in verdict.discrepancies],
         "note": verdict.note,
-        "cause": None if diagnosis is None else diagnosis.cause,
-        "must_change": [] if diagnosis is None else [str(f) for f in diagnosis.must_change],
     }
+
+
+def _replan_json(replan: Replan) -> dict[str, Any]:
+    from forestall.records.derived import new_plan
+
+    plan = new_plan(replan)
+    return {
+        "outcome": replan.outcome.value,
+        "plan": None if plan is None else plan.texts(),
+        "assumed": _assumed(replan),
+        "note": replan.note,
+    }
+
+
+def _assumed(replan: Replan) -> list[str]:
+    return [] if replan.check is None else [str(fact) for fact in replan.check.assumed]
+
+
+def _tell(found: Judgements, page: Path | None) -> None:
+    several = len(found.each) > 1
+    for judgement in found.each:
+        decision, record = judgement.decision, judgement.record
+        where = f"{judgement.path}: " if several else ""
+        print(f"{where}{decision.outcome.value}: before {record.subtask}")
+        for line in _lines(decision):
+            print(f"  {line}")
+    if several:
+        alarms = sum(j.alarm for j in found.each)
+        unclear = sum(not j.judged for j in found.each)
+        print(f"{len(found.each)} scenes: {alarms} with an alarm, {unclear} not judged")
+    if page is not None:
+        print(page)
+
+
+def _lines(decision: MonitorDecision) -> Iterator[str]:
+    """What is said of one scene, below its first line."""
+    verdict, diagnosis, replan = decision.verdict, decision.diagnosis, decision.replan
+    if verdict is not None:
+        score = "none" if verdict.score is None else f"{verdict.score:.3f}"
+        threshold, count = f"{verdict.threshold:.2f}", verdict.references
+        yield f"score {score}, threshold {threshold}, {count} references"
+    cause = "" if diagnosis is None else diagnosis.cause
+    said = [decision.why, "" if verdict is None else verdict.note]
+    yield from dict.fromkeys(text for text in said if text and text != cause)
+    if verdict is not None:
+        yield from (f"{d.change.value}: {d.text}" for d in verdict.discrepancies)
+    if diagnosis is not None:
+        yield f"cause: {diagnosis.cause}"
+        yield from (f"must change: {fact}" for fact in diagnosis.must_change)
+    if decision.plan is not None:
+        yield "corrected plan, checked on what is seen:"
+        yield from (f"  {n}. {step}" for n, step in enumerate(decision.plan, 1))
+        if replan is not None and _assumed(replan):
+            yield f"which relies on what was not seen: {', '.join(_assumed(replan))}"

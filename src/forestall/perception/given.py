@@ -11,13 +11,13 @@ class GivenStateEstimator:
     """Hands on states by instance name; nothing is known of other instances.
 
     Args:
-        states: instance name → attribute → value.
+        states: instance name → attribute → value; read anew at every frame.
     """
 
     name = "given states"
 
     def __init__(self, states: Mapping[str, Mapping[str, str]]) -> None:
-        self._states = {k: dict(v) for k, v in states.items()}
+        self._states = states
 
     def estimate(
         self, frame: Frame, detections: Sequence[Detection]

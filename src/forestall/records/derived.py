@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from forestall.types.decision import Outcome
 from forestall.types.episode import (
     BoundaryRecord,
     EpisodeRecord,
@@ -214,6 +215,8 @@ def moments(record: EpisodeRecord) -> tuple[Moment, ...]:
             after = adopted(boundary, record.executed)
             if after is not None:
                 plan, adopted_at = after.subtasks, reached
+            elif boundary.outcome is Outcome.REPLAN:  # proposed, and the old plan went on
+                after = new_plan(boundary.replan)
             mine = done if position in starts[-1:] else None
             if mine is not None and not same_step(mine.subtask, boundary.subtask):
                 mine = None

@@ -1,0 +1,132 @@
+"""Scenes that are given as files: observation folders, scene graphs, and folders of either.
+
+Called by `checking` and the command line; calls the reader of perception.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from forestall.domain.model import Domain
+from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.perception.folder import OBSERVATION_FILE, read_observation
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+
+GRAPH_SUFFIX = ".json"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stored:
+    """One scene as it was read.
+
+    Args:
+        path: of the folder or file.
+        scene: pictures, or a graph.
+        states: instance → attribute → value, as they were written down beside the pictures.
+    """
+
+    path: Path
+    scene: Observation | SceneGraph
+    states: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    @property
+    def time_s(self) -> float:
+        """Of the robot's clock, 0 where it is not told."""
+        return self.scene.time_s if isinstance(self.scene, Observation) else 0.0
+
+
+def scenes_in(paths: Iterable[Path]) -> list[Path]:
+    """Every scene in order: those that are named, and the numbered ones in a folder that is named.
+
+    Raises:
+        FileFormatError: a folder that is no observation and holds none; or no clear order.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.name == OBSERVATION_FILE:
+            found.append(path.parent)
+        elif path.is_dir() and not (path / OBSERVATION_FILE).is_file():
+            found += _numbered(path)
+        else:
+            found.append(path)
+    return found
+
+
+def is_graph(path: Path) -> bool:
+    """Whether a scene is a graph file and no observation folder."""
+    return path.suffix == GRAPH_SUFFIX and not path.is_dir()
+
+
+def read_scene(path: Path, domain: Domain) -> Stored:
+    """Read one scene.
+
+    Raises:
+        FileFormatError: a file is missing or cannot be read as what it should be.
+        UnknownNameError: a name that is not in the domain.
+        PerceptionError: depth or masks that cannot be used.
+    """
+    if not is_graph(path):
+        return Stored(path, *read_observation(path, domain))
+    graph = read_graph(path)
+    try:
+        _check(graph, domain)
+    except UnknownNameError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+    return Stored(path, graph)
+
+
+def read_graph(path: Path) -> SceneGraph:
+    """A scene graph from a JSON file.
+
+    Raises:
+        FileFormatError: it cannot be read, or is no scene graph.
+        InputError: it contradicts itself (a dangling relation, an id twice).
+    """
+    try:
+        return SceneGraph.from_json(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise FileFormatError(f"cannot read scene graph {path}: {error}") from error
+    except InputError as error:
+        raise type(error)(f"{path}: {error}") from error
+
+
+def _numbered(folder: Path) -> list[Path]:
+    """The scenes of a folder by the first number in their names."""
+    entries = [p for p in sorted(folder.iterdir()) if _may_be_scene(p)]
+    if not entries:
+        raise FileFormatError(
+            f"{folder} holds no {OBSERVATION_FILE}, and no observation folders or graph files "
+            f"with numbers in their names (01, 02, ... or step-1{GRAPH_SUFFIX}, ...)"
+        )
+    numbers: dict[int, Path] = {}
+    for path in entries:
+        found = re.search(r"\d+", path.name)
+        if found is None:
+            raise FileFormatError(f"{path}: a number in its name must say when it comes")
+        number = int(found[0])
+        if number in numbers:
+            raise FileFormatError(f"{path} has the same number as {numbers[number].name}")
+        numbers[number] = path
+    return [numbers[n] for n in sorted(numbers)]
+
+
+def _may_be_scene(path: Path) -> bool:
+    return (path / OBSERVATION_FILE).is_file() if path.is_dir() else is_graph(path)
+
+
+def _check(graph: SceneGraph, domain: Domain) -> None:
+    """A category may be any; what is said of things must mean something in the domain."""
+    for relation in graph.relations:
+        if relation.predicate not in domain.predicates:
+            raise UnknownNameError("relation", relation.predicate, domain.relations)
+    for node in graph.nodes:
+        for attribute, value in node.states:
+            if attribute not in domain.attributes:
+                raise UnknownNameError(f"attribute of {node.id}", attribute, domain.attributes)
+            if value is not None and value not in domain.values(attribute):
+                raise UnknownNameError(f"{attribute} of {node.id}", value, domain.values(attribute))

@@ -1,0 +1,266 @@
+"""`forestall check`: scenes of the user's own, alone and in a sequence, judged by a monitor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from forestall.assembly.checking import Question, judge_stored
+from forestall.assembly.configuration import Given, run_config
+from forestall.assembly.demonstrations import RecordingJob, record_one
+from forestall.assembly.make import prepare, run_episode
+from forestall.cli.main import call
+from forestall.config import DEMONSTRATION_SEEDS
+from forestall.domain.load import shipped
+from forestall.memory.store import open_store
+from forestall.perception.folder import write_observation
+from forestall.perception.given import GivenStateEstimator
+from forestall.perception.perceiver import GraphPerceiver
+from forestall.perception.segmenters import InstanceSegmenter
+from forestall.types.decision import Outcome
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.observation import Observation
+from forestall.types.plan import Subtask
+from perception.synthetic import Solid, at, looking, observed
+
+POSE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
+COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
+PLATE = at("Plate-1", 0.1, 0.3, 0.9, (0.22, 0.22, 0.02), True)
+POTATO = at("Potato-1", 0.1, 0.3, 0.92, (0.1, 0.07, 0.065))
+MUG = at("Mug-1", -0.4, 0.3, 0.9, (0.08, 0.08, 0.1), True)
+STEPS = ("pick_up(Plate-1)", "put_on(Plate-1, CounterTop-1)")
+STEP, LATER = "pick_up(Plate)", "put_on(Plate, CounterTop)"
+STATES = {"Plate-1": {"dirty": "clean"}, "Mug-1": {"dirty": "clean"}}
+
+
+HELD = at("Plate-1", 0.5, 0.1, 1.1, (0.22, 0.22, 0.02), True)
+
+
+def seen(*things: Solid, time_s: float = 0.0) -> Observation:
+    holding = "Plate-1" if HELD in things else None
+    return observed([COUNTER, *things], POSE, holding=holding, hand=(0.5, 0.1, 1.15), time_s=time_s)
+
+
+def written(folder: Path, *things: Solid, time_s: float = 0.0, **states: dict[str, str]) -> Path:
+    said = {**STATES, **{name.replace("_", "-"): value for name, value in states.items()}}
+    write_observation(folder, seen(*things, time_s=time_s), said)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def memory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two demonstrations: a clean plate and a mug on the counter, taken and put back."""
+    path = tmp_path_factory.mktemp("memory") / "own.db"
+    domain = shipped("household")
+    with open_store(path, create=True) as store:
+        for number in range(2):
+            perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator(STATES), domain)
+            mug = MUG.moved((0.05 * number, 0.0, 0.0))
+            kept = []
+            for index, plate in enumerate((PLATE, HELD)):
+                step = Subtask.parse(STEPS[index])
+                whole = perceiver.perceive(seen(plate, mug))
+                kept.append(DemonstrationStep(index, step, perceiver.scope(whole, step), whole))
+            store.add(Demonstration("clear-up", f"own-{number}", number, tuple(kept)))
+    return path
+
+
+def checked(
+    capsys: pytest.CaptureFixture[str], scenes: Sequence[Path], *more: str
+) -> tuple[int, dict[str, Any]]:
+    code = call(["check", *map(str, scenes), *more, "--json"])
+    out, err = capsys.readouterr()
+    assert out, err
+    return code, json.loads(out)
+
+
+def test_one_folder_of_pictures(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["--subtask", STEP, "--memory", str(memory)]
+    scenes = {
+        "fine": written(tmp_path / "fine", PLATE, MUG),
+        "full": written(tmp_path / "full", PLATE, MUG, POTATO),
+        "dirty": written(tmp_path / "dirty", PLATE, MUG, Plate_1={"dirty": "dirty"}),
+        "gone": written(tmp_path / "gone", MUG),
+        "empty": written(tmp_path / "empty"),
+    }
+    told = {name: checked(capsys, [path], *asked) for name, path in scenes.items()}
+    assert {name: (code, data["outcome"]) for name, (code, data) in told.items()} == {
+        "fine": (0, "proceed"),
+        "full": (1, "replan"),
+        "dirty": (1, "hold"),
+        "gone": (4, "look"),
+        "empty": (4, "look"),
+    }
+    (full,) = told["full"][1]["scenes"]
+    assert full["cause"].startswith("Potato-1 is on top of Plate-1")
+    assert full["replan"]["plan"][-1] == "pick_up(Plate-1)"
+    assert "pick_up(Potato-1)" in full["replan"]["plan"]
+    assert told["dirty"][1]["scenes"][0]["hold"] == "alarm without an answer"
+
+
+def test_what_was_not_seen_never_proceeds_whatever_the_score_is(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gone = written(tmp_path / "gone", MUG)
+    asked = ["--subtask", STEP, "--memory", str(memory), "--threshold", "0.1"]
+    code, told = checked(capsys, [gone], *asked)
+    assert (code, told["outcome"]) == (4, "not judged")
+    assert told["scenes"][0]["verdict"]["decision"] == "proceed"
+    assert told["scenes"][0]["why"] == "not located: Plate"
+    code, told = checked(capsys, [gone], "--subtask", "open_obj(Fridge)", "--memory", str(memory))
+    assert code == 4 and told["scenes"][0]["verdict"]["score"] is None
+
+
+def test_a_sequence_is_judged_before_the_subtasks_of_a_plan(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(tmp_path / "run" / "step-2", HELD, MUG, time_s=14.0)
+    written(tmp_path / "run" / "step-10", PLATE, MUG, POTATO, time_s=15.0)
+    written(tmp_path / "run" / "step-1", PLATE, MUG, time_s=4.0)
+    (tmp_path / "run" / "notes.txt").write_text("not a scene")
+    plan = tmp_path / "plan.txt"
+    plan.write_text(f"# clearing up\n{STEP}; {LATER}  # and again\n\n{STEP}\n")
+    page = tmp_path / "out" / "page.html"
+    asked = ["--plan", str(plan), "--memory", str(memory)]
+    code, told = checked(capsys, [tmp_path / "run"], *asked, "--page", str(page))
+    assert code == 1 and told["outcome"] == "replan"
+    assert [(Path(s["scene"]).name, s["subtask"], s["outcome"]) for s in told["scenes"]] == [
+        ("step-1", "pick_up(Plate-1)", "proceed"),
+        ("step-2", "put_on(Plate-1, CounterTop-1)", "proceed"),
+        ("step-10", "pick_up(Plate-1)", "replan"),
+    ]
+    text = page.read_text(encoding="utf-8")
+    assert told["page"] == str(page) and "data:image/" in text
+    assert "alarm, replanned" in text and "put_on" in text and "stored observations" in text
+    scenes = [str(tmp_path / "run" / name) for name in ("step-10", "step-2")]
+    assert call(["check", *scenes, *asked]) == 1
+    out = capsys.readouterr().out
+    assert "step-10: replan: before pick_up(Plate-1)" in out
+    assert "corrected plan, checked on what is seen:\n    1. navigate_to_obj(Potato-1)" in out
+    assert "2 scenes: " in out
+
+
+def test_every_scene_may_be_judged_before_the_same_subtask(memory: Path, tmp_path: Path) -> None:
+    full = [written(tmp_path / f"full-{k}", PLATE, MUG, POTATO) for k in range(4)]
+    scenes = [written(tmp_path / "a", PLATE, MUG), *full, written(tmp_path / "b", PLATE, MUG)]
+    with open_store(memory) as store:
+        found = judge_stored(scenes, Question(STEP, f"{STEP}; {LATER}"), store.required())
+    outcomes = [j.decision.outcome for j in found.each]
+    assert outcomes == [Outcome.PROCEED, *[Outcome.REPLAN] * 4, Outcome.PROCEED]
+    assert all(
+        j.decision.plan.texts()[-1] == "put_on(Plate-1, CounterTop)" for j in found.each[1:5]
+    )
+    assert [b.observation for b in found.record.boundaries] == [None] * 6
+    assert found.record.executed == ()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "nothing to judge"),
+        (["fine"], "say before what: --subtask STEP, --plan"),
+        (["fine", "--subtask", "pickup(Plate)"], "unknown skill 'pickup': did you mean pick_up"),
+        (["fine", "--subtask", "pick_up(Plaet)"], "did you mean Plate"),
+        (["fine", "--subtask", STEP, "--plan", "pick_up(Mug)"], "unknown step of the plan"),
+        (["fine", "fine", "--plan", STEP], "2 scenes for the 1 subtasks of the plan"),
+        (["fine", "--plan", "pick_up(Plate); pickup(Mug)"], "--plan: step 2: unknown skill"),
+        (["fine", "--plan", "absent.txt"], "cannot read plan absent.txt"),
+        (["fine", "--plan", "empty.txt"], "empty.txt: the plan has no step"),
+        (["absent", "--subtask", STEP], "absent is not a folder"),
+        (["absent.json", "--subtask", STEP], "cannot read scene graph absent.json"),
+        (["nothing", "--subtask", STEP], "nothing holds no observation.json, and no observation"),
+        (["twice", "--subtask", STEP], "graph-1.json has the same number as 01"),
+        (["unnumbered", "--subtask", STEP], "a number in its name must say when it comes"),
+        (["graph.json", "--subtask", STEP], "graph.json: unknown relation 'insid': did you mean"),
+        (["fine", "--subtask", STEP, "--domain", "bench"], "unknown skill 'pick_up'"),
+        (["fine", "--subtask", STEP, "--states", "oracle"], "states of a stored observation"),
+    ],
+)
+def test_what_is_not_valid_is_told_in_a_sentence(
+    memory: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    says: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("fine", "twice/01", "unnumbered/first"):
+        written(tmp_path / name, PLATE, MUG)
+    (tmp_path / "nothing").mkdir()
+    graph = GRAPH | {"relations": [["Mug-1", "insid", "Plate-1"]]}
+    for name in ("graph.json", "twice/graph-1.json"):
+        (tmp_path / name).write_text(json.dumps(graph))
+    (tmp_path / "empty.txt").write_text("# nothing\n")
+    assert call(["check", *arguments, "--memory", str(memory)]) == 2
+    out, err = capsys.readouterr()
+    assert not out and says in err and len(err.splitlines()) == 1
+
+
+GRAPH = {
+    "format": 1,
+    "nodes": [{"id": "Mug-1", "category": "Mug"}, {"id": "Plate-1", "category": "Plate"}],
+}
+
+
+# --- scene graphs -------------------------------------------------------------------------------
+
+SYMBOLIC = Given.named({"world": "symbolic", "perceiver": "given-graph"})
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Graphs before every subtask of a run into a hole full of chips, and a memory beside them."""
+    folder = tmp_path_factory.mktemp("bench")
+    with open_store(folder / "bench.db", create=True) as store:
+        for k in range(3):
+            job = RecordingJob("fasten-plate", DEMONSTRATION_SEEDS + 10 * k, SYMBOLIC)
+            store.add(record_one(job))
+    config = run_config("fasten-plate", "hole-full-of-chips", seed=3, strategy="none")
+    record = run_episode(prepare(config), None)
+    (folder / "graphs").mkdir()
+    for b in record.boundaries[:3]:
+        path = folder / "graphs" / f"{b.index + 1:02d}-{b.subtask.skill}.json"
+        path.write_text(json.dumps(b.graph.to_json()))
+    return folder
+
+
+PLAN = "move_to(Bolt); pick(Bolt); insert(Bolt, BoltHole)"
+
+
+@pytest.mark.parametrize(
+    "asked", [["--plan", PLAN, "--domain", "bench"], ["--task", "fasten-plate"]]
+)
+def test_graphs_of_another_domain_are_judged_along_a_plan(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], asked: list[str]
+) -> None:
+    page = tmp_path / "page.html"
+    more = ["--memory", str(bench / "bench.db"), "--page", str(page)]
+    code, told = checked(capsys, [bench / "graphs"], *asked, *more)
+    assert (code, told["domain"]) == (1, "bench")
+    *fine, last = told["scenes"]
+    assert [s["outcome"] for s in fine] == ["proceed", "proceed"]
+    assert last["outcome"] == "replan" and "dirty" in last["cause"]
+    steps = last["replan"]["plan"]
+    assert any(s.startswith("insert(Bolt") for s in steps) and len(steps) > 1
+    assert any(s.startswith("screw") for s in steps) == ("--task" in asked)
+    assert "insert" in page.read_text(encoding="utf-8")
+
+
+def test_one_graph_of_a_step_in_the_middle(bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (graph,) = (bench / "graphs").glob("03-*.json")
+    asked = ["--task", "fasten-plate", "--memory", str(bench / "bench.db")]
+    code, told = checked(capsys, [graph], "--subtask", "insert(Bolt, BoltHole)", *asked)
+    assert code == 1 and told["plan"][0] == "insert(Bolt, BoltHole)"
+    code, told = checked(capsys, [graph], "--subtask", "screw(Nut, Bolt)", *asked)
+    assert code in (1, 4)
+    code, told = checked(capsys, [graph], "--subtask", "insert(Bolt, BoltHole)", *asked,
+                         "--strategy.name", "none")  # fmt: skip
+    assert (code, told["outcome"]) == (4, "not judged")
+    assert "the strategy none does not judge here" in told["scenes"][0]["why"]
