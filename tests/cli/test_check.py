@@ -178,6 +178,7 @@ def test_every_scene_may_be_judged_before_the_same_subtask(memory: Path, tmp_pat
         (["twice", "--subtask", STEP], "graph-1.json has the same number as 01"),
         (["unnumbered", "--subtask", STEP], "a number in its name must say when it comes"),
         (["graph.json", "--subtask", STEP], "graph.json: unknown relation 'insid': did you mean"),
+        (["within.json", "--subtask", STEP], "Mug-1, Plate-1: a thing cannot be in or on itself"),
         (["fine", "--subtask", STEP, "--domain", "bench"], "unknown skill 'pick_up'"),
         (["fine", "--subtask", STEP, "--states", "oracle"], "states of a stored observation"),
     ],
@@ -197,6 +198,8 @@ def test_what_is_not_valid_is_told_in_a_sentence(
     graph = GRAPH | {"relations": [["Mug-1", "insid", "Plate-1"]]}
     for name in ("graph.json", "twice/graph-1.json"):
         (tmp_path / name).write_text(json.dumps(graph))
+    ring = [["Mug-1", "inside", "Plate-1"], ["Plate-1", "on_top_of", "Mug-1"]]
+    (tmp_path / "within.json").write_text(json.dumps(GRAPH | {"relations": ring}))
     (tmp_path / "empty.txt").write_text("# nothing\n")
     assert call(["check", *arguments, "--memory", str(memory)]) == 2
     out, err = capsys.readouterr()

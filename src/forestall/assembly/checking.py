@@ -282,6 +282,8 @@ def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgeme
     elif decision.outcome is Outcome.LOOK and verdict and verdict.decision is Decision.REPLAN:
         why = f"no corrected plan was found: {decision.why}"
         decision = replace(decision, outcome=Outcome.HOLD, hold=Hold.ALARM, why=why)
+    if not decision.why and verdict is not None:
+        decision = replace(decision, why=verdict.note)
     record = replace(record, outcome=decision.outcome)
     if not pictures:
         record = replace(record, observation=None)

@@ -9,6 +9,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from forestall.domain.model import Domain
@@ -66,8 +67,9 @@ def read_scene(path: Path, domain: Domain) -> Stored:
     """Read one scene.
 
     Raises:
-        FileFormatError: a file is missing or cannot be read as what it should be.
-        UnknownNameError: a name that is not in the domain.
+        FileFormatError: a file is missing, cannot be read as what it should be, or says of things
+            what means nothing in the domain.
+        UnknownNameError: a name in an observation folder that is not in the domain.
         PerceptionError: depth or masks that cannot be used.
     """
     if not is_graph(path):
@@ -75,7 +77,7 @@ def read_scene(path: Path, domain: Domain) -> Stored:
     graph = read_graph(path)
     try:
         _check(graph, domain)
-    except UnknownNameError as error:
+    except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
     return Stored(path, graph)
 
@@ -121,12 +123,20 @@ def _may_be_scene(path: Path) -> bool:
 
 def _check(graph: SceneGraph, domain: Domain) -> None:
     """A category may be any; what is said of things must mean something in the domain."""
+    within: TopologicalSorter[str] = TopologicalSorter()
     for relation in graph.relations:
-        if relation.predicate not in domain.predicates:
+        if relation.predicate not in domain.relations:
             raise UnknownNameError("relation", relation.predicate, domain.relations)
+        if relation.predicate in domain.containing:
+            within.add(relation.subject, relation.object)
     for node in graph.nodes:
         for attribute, value in node.states:
             if attribute not in domain.attributes:
                 raise UnknownNameError(f"attribute of {node.id}", attribute, domain.attributes)
             if value is not None and value not in domain.values(attribute):
                 raise UnknownNameError(f"{attribute} of {node.id}", value, domain.values(attribute))
+    try:
+        within.prepare()
+    except CycleError as error:
+        chain = ", ".join(dict.fromkeys(error.args[1]))
+        raise InputError(f"{chain}: a thing cannot be in or on itself") from error
