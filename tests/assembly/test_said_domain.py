@@ -65,7 +65,7 @@ def test_a_run_is_of_the_domain_that_was_said_and_says_so(blowing: str) -> None:
 
 
 def test_its_demonstrations_are_recorded_in_it_and_keyed_by_its_content(blowing: str) -> None:
-    config = run_config("fasten-plate", domain=blowing, **{"text-encoder.dimensions": 64})
+    config = run_config("fasten-plate", domain=blowing, detector="objects")
     path = ready_made(config, workers=2)
     assert ready_made(config) == path != ready_made(run_config("fasten-plate"), workers=1)
     demonstrations, used = load_memory(config)

@@ -8,7 +8,7 @@ followed. Composition like `make`, for `forestall check`.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -140,13 +140,10 @@ def judge_stored(
     monitor.start(task)
     found: list[Judgement] = []
     passed: list[ExecutedRecord] = []
-    for path in scenes:
-        stored = read_scene(path, domain)
-        stated.clear()
-        stated.update(stored.states)
+    for stored in _read(scenes, domain, stated):
         if found and wanted is None:
             passed.append(_passed(monitor, found[-1].record, stored))
-        found.append(_judgement(path, monitor.before(stored.scene, wanted), pictures))
+        found.append(_judgement(stored.path, monitor.before(stored.scene, wanted), pictures))
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -167,6 +164,17 @@ def judge_stored(
         ),
     )
     return Judgements(tuple(found), record)
+
+
+def _read(
+    scenes: Sequence[Path], domain: Domain, stated: dict[str, Mapping[str, str]]
+) -> Iterator[Stored]:
+    """Scene by scene, so that few pictures are held at once; `stated` is what the last one says."""
+    for path in scenes:
+        stored = read_scene(path, domain)
+        stated.clear()
+        stated.update(stored.states)
+        yield stored
 
 
 def _config(question: Question, given: Given, graphs: bool) -> RunConfig:

@@ -9,13 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from forestall.assembly.configuration import Choice, Given, choices
-from forestall.assembly.options import built
+from forestall.assembly.configuration import Choice, Given, choices, domain_of
 from forestall.assembly.parts import Assembly
-from forestall.assembly.registry import find
 from forestall.assembly.sources import Source, demonstrations_from
 from forestall.conclusion import MonitorConfig
-from forestall.domain.load import load_domain
 from forestall.domain.model import Domain
 from forestall.kinds import DOMAIN, PERCEIVER, STRATEGY
 from forestall.learning.learn import learn
@@ -95,7 +92,4 @@ class Monitor(RunMonitor):
 def _domain(said: Domain | str | Path) -> Domain:
     if isinstance(said, Domain):
         return said
-    if isinstance(said, Path) or said.endswith((".toml", ".pddl")):
-        return load_domain(str(said))
-    found: Domain = built(find(DOMAIN.name, said), {}, None)
-    return found
+    return domain_of(Given.named({DOMAIN.name: str(said)}).chosen(DOMAIN.name))

@@ -17,6 +17,7 @@ from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.folder import OBSERVATION_FILE, read_observation
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
+from forestall.types.symbolic import scene_graph
 
 GRAPH_SUFFIX = ".json"
 
@@ -83,14 +84,14 @@ def read_scene(path: Path, domain: Domain) -> Stored:
 
 
 def read_graph(path: Path) -> SceneGraph:
-    """A scene graph from a JSON file.
+    """A scene graph from a JSON file, whole or in the short form (`types.symbolic`).
 
     Raises:
         FileFormatError: it cannot be read, or is no scene graph.
         InputError: it contradicts itself (a dangling relation, an id twice).
     """
     try:
-        return SceneGraph.from_json(json.loads(path.read_text(encoding="utf-8")))
+        return scene_graph(json.loads(path.read_text(encoding="utf-8-sig")))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise FileFormatError(f"cannot read scene graph {path}: {error}") from error
     except InputError as error:
