@@ -263,3 +263,15 @@ def test_one_graph_of_a_step_in_the_middle(bench: Path, capsys: pytest.CaptureFi
                          "--strategy.name", "none")  # fmt: skip
     assert (code, told["outcome"]) == (4, "not judged")
     assert "the strategy none does not judge here" in told["scenes"][0]["why"]
+
+
+def test_the_plan_alone_may_be_checked_without_any_demonstration(
+    bench: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (graph,) = (bench / "graphs").glob("03-*.json")
+    asked = ["--plan", PLAN, "--subtask", "insert(Bolt, BoltHole)", "--domain", "bench"]
+    code, told = checked(capsys, [graph], *asked, "--strategy.name", "plan-check")
+    assert code == 1 and told["memory"] is None
+    assert "full of chips" in told["scenes"][0]["cause"]
+    assert call(["check", str(graph), *asked]) == 2
+    assert "give --memory FILE" in capsys.readouterr().err

@@ -18,7 +18,7 @@ from forestall.assembly.make import STORED_STATES, provenance
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import known
 from forestall.assembly.stored import Stored, is_graph, read_scene, scenes_in
-from forestall.conclusion import MonitorConfig
+from forestall.conclusion import MonitorConfig, unlocated
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.kinds import PERCEIVER, STATES, STRATEGY
@@ -37,7 +37,6 @@ from forestall.types.episode import (
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
-from forestall.types.verdict import Decision
 
 TRUTH_STATES = "oracle"
 """The simulator's own, which no stored observation has."""
@@ -102,7 +101,7 @@ class Judgements:
 def judge_stored(
     paths: Sequence[Path],
     question: Question,
-    demonstrations: Sequence[Demonstration],
+    demonstrations: Sequence[Demonstration] | None = None,
     given: Given | None = None,
     memory: str | None = None,
     pictures: bool = False,
@@ -113,7 +112,7 @@ def judge_stored(
         paths: observation folders (docs/observation-format.md), graph files, or folders that hold
             numbered ones.
         question: before what.
-        demonstrations: the memory.
+        demonstrations: the memory; None only for a strategy that uses none.
         given: what was said about parts: the detector's threshold, what reads states off pictures.
         memory: where the demonstrations come from, for the record.
         pictures: whether they stay in the record.
@@ -143,7 +142,7 @@ def judge_stored(
     for stored in _read(scenes, domain, stated):
         if found and wanted is None:
             passed.append(_passed(monitor, found[-1].record, stored))
-        found.append(_judgement(stored.path, monitor.before(stored.scene, wanted), pictures))
+        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures))
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -192,7 +191,7 @@ def _config(question: Question, given: Given, graphs: bool) -> RunConfig:
 
 
 def _task(
-    question: Question, config: RunConfig, demonstrations: Sequence[Demonstration]
+    question: Question, config: RunConfig, demonstrations: Sequence[Demonstration] | None
 ) -> tuple[Task, Domain]:
     """The task with the plan at hand, and its domain.
 
@@ -202,7 +201,7 @@ def _task(
     if question.task is None:
         domain = config.load_domain()
         title = f"before {question.subtask}" if question.subtask else "a plan"
-        shown = {d.task for d in demonstrations}
+        shown = {d.task for d in demonstrations or ()}
         name = shown.pop() if question.plan is not None and len(shown) == 1 else ""
         task = Task(name, title, Goal(""), Plan(()), SceneNeeds(), domain.name)
     else:
@@ -276,20 +275,25 @@ def _passed(monitor: Monitor, last: BoundaryRecord, following: Stored) -> Execut
     return ExecutedRecord(last.subtask, done, last.index)
 
 
-def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgement:
-    """What is kept of a decision.
+def _asked(monitor: Monitor, stored: Stored, wanted: Subtask | None) -> MonitorDecision:
+    """What the monitor says of a scene.
 
-    A plan that may not be adopted is one that is proposed. An alarm that wants another look before
-    it gives up on a plan holds: here nobody looks.
+    Nobody looks here. Where an argument was not seen, "look" is the answer; a monitor that only
+    wants to be sure is asked again with the same scene.
     """
+    decision = monitor.before(stored.scene, wanted)
+    if decision.outcome is not Outcome.LOOK or decision.context is None:
+        return decision
+    return decision if unlocated(decision.context) else monitor.before(stored.scene, wanted)
+
+
+def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgement:
+    """What is kept of a decision; a plan that may not be adopted is one that is proposed."""
     record, replan, verdict = decision.record, decision.replan, decision.verdict
     assert record is not None, "what was looked at is recorded"
-    cause = "" if decision.diagnosis is None else decision.diagnosis.cause
     if decision.hold is Hold.REPLAN_LIMIT and replan is not None:
-        decision = replace(decision, outcome=Outcome.REPLAN, hold=None, plan=replan.plan, why=cause)
-    elif decision.outcome is Outcome.LOOK and verdict and verdict.decision is Decision.REPLAN:
-        why = f"no corrected plan was found: {decision.why}"
-        decision = replace(decision, outcome=Outcome.HOLD, hold=Hold.ALARM, why=why)
+        why = "" if decision.diagnosis is None else decision.diagnosis.cause
+        decision = replace(decision, outcome=Outcome.REPLAN, hold=None, plan=replan.plan, why=why)
     if not decision.why and verdict is not None:
         decision = replace(decision, why=verdict.note)
     record = replace(record, outcome=decision.outcome)

@@ -111,6 +111,7 @@ def check(
     from forestall.assembly.checking import Question, judge_stored
     from forestall.assembly.configuration import Given, run_config
     from forestall.assembly.demonstrations import memory_path
+    from forestall.assembly.make import needs_memory
     from forestall.cli.demos import memory_of
     from forestall.errors import InputError
     from forestall.kinds import STATES
@@ -126,9 +127,13 @@ def check(
     ).given()
     remembering = Given(tuple(part for part in given.parts if part[0] != STATES.name))
     wanted = run_config(task or "", given=remembering)
-    if task is None and memory_path(wanted) is None:
-        raise InputError("give --memory FILE, or --task NAME to compare with its ready-made memory")
-    demonstrations, path = memory_of(wanted, as_json)
+    demonstrations, path = None, None
+    if needs_memory(wanted):
+        if task is None and memory_path(wanted) is None:
+            raise InputError(
+                "give --memory FILE, or --task NAME to compare with its ready-made memory"
+            )
+        demonstrations, path = memory_of(wanted, as_json)
     question = Question(subtask, plan, task)
     found = judge_stored(scenes, question, demonstrations, given, path, page is not None)
     if page is not None:
@@ -146,7 +151,7 @@ def _code(found: Judgements) -> int:
     return 0 if all(j.judged for j in found.each) else 4
 
 
-def _judgements_json(found: Judgements, memory: str, page: Path | None) -> dict[str, Any]:
+def _judgements_json(found: Judgements, memory: str | None, page: Path | None) -> dict[str, Any]:
     record = found.record
     return {
         "outcome": found.outcome.value,
