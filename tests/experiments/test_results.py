@@ -17,6 +17,9 @@ from forestall.experiments.results import SUMMARY, present
 from forestall.experiments.runs import Choice
 from forestall.statistics import intervals
 
+pytestmark = pytest.mark.slow
+"""Every figure of an experiment is drawn, several times."""
+
 
 @pytest.fixture(autouse=True)
 def _few_draws(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:

@@ -34,6 +34,10 @@ META: Mapping[str, Any] = {
 }
 
 
+pytestmark = pytest.mark.slow
+"""Every figure of an experiment is drawn, several times."""
+
+
 @pytest.fixture(autouse=True, scope="module")
 def few_draws() -> Any:
     """Fewer draws of the bootstrap: these tests are about what is shown."""
