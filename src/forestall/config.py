@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from forestall.errors import ForestallError
+
 DEFAULT_DOMAIN = "household"
 """The domain of files and commands that name none."""
 
@@ -25,10 +27,17 @@ PICTURE_SEEDS = {
 
 
 def cache_dir() -> Path:
-    """The folder for what can be made again (FORESTALL_CACHE overrides it)."""
+    """The folder for what can be made again (FORESTALL_CACHE overrides it).
+
+    Raises:
+        ForestallError: this user has no home folder.
+    """
     override = os.environ.get("FORESTALL_CACHE")
     if override:
         return Path(override)
     from platformdirs import user_cache_path
 
-    return user_cache_path("forestall", appauthor=False)
+    path = user_cache_path("forestall", appauthor=False)
+    if not path.is_absolute():
+        raise ForestallError("there is no home folder for the cache: set FORESTALL_CACHE to one")
+    return path

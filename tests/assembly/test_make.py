@@ -24,6 +24,7 @@ from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.load import shipped
 from forestall.errors import InputError, MemoryFileError
 from forestall.kinds import WORLD
+from forestall.types.demonstration import Demonstration
 
 PLAIN = Given.named(
     {
@@ -89,16 +90,19 @@ def test_a_ready_made_memory_is_of_the_parts_that_it_is_recorded_with(
     made = record_one(RecordingJob("toast-bread", DEMONSTRATION_SEEDS, PLAIN))
     recorded: list[RecordingJob] = []
 
-    def record_all(jobs: list[RecordingJob], *_: object) -> list[object]:
-        recorded.extend(jobs)
-        return [made]
+    def record(job: RecordingJob) -> Demonstration:
+        recorded.append(job)
+        return made
 
-    monkeypatch.setattr(module, "record_all", record_all)
-    one = ready_made(plain("toast-bread"))
-    assert ready_made(plain("toast-bread", detector="image", strategy="online")) == one
+    def ready(**named: Any) -> Path:
+        return ready_made(plain("toast-bread", **named), workers=1)
+
+    monkeypatch.setattr(module, "record_one", record)
+    one = ready()
+    assert ready(detector="image", strategy="online") == one
     assert len(recorded) == 4
-    assert ready_made(plain("toast-bread", image_encoder="clip")) != one
-    assert ready_made(plain("toast-bread", **dict[str, Any]({"world.gravity": 1.6}))) != one
+    assert ready(image_encoder="clip") != one
+    assert ready(**{"world.gravity": 1.6}) != one
     assert recorded[-1].config(1).choice(WORLD).options == {"gravity": 1.6}
 
 

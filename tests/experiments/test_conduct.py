@@ -127,7 +127,10 @@ def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> N
 
 def test_two_commands_do_not_write_to_one_folder(tmp_path: Path) -> None:
     play(SMALL, tmp_path)
-    with episodes_in(tmp_path).alone(), pytest.raises(InputError, match="another experiment"):
+    with (
+        episodes_in(tmp_path).alone(),
+        pytest.raises(InputError, match="written by process"),
+    ):
         play(SMALL, tmp_path)
 
 

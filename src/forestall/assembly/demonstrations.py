@@ -7,11 +7,12 @@ range, which runs refuse.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import closing
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 
 import forestall
@@ -21,7 +22,8 @@ from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.domain.model import Domain
 from forestall.embeddings.views import view_of
-from forestall.errors import ForestallError
+from forestall.errors import ForestallError, MemoryFileError
+from forestall.files import alone
 from forestall.fingerprint import sources_digest, weights_of
 from forestall.kinds import (
     CAPTIONER,
@@ -34,7 +36,8 @@ from forestall.kinds import (
     WORLD,
 )
 from forestall.memory.recording import demonstration_from
-from forestall.memory.store import open_store
+from forestall.memory.store import SqliteStore, open_store
+from forestall.processes import pool
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
 from forestall.types.observation import Observation
@@ -125,37 +128,94 @@ def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord],
     return view
 
 
-def record_all(
-    jobs: Sequence[RecordingJob], workers: int, progress: Progress | None = None
-) -> Iterator[Demonstration]:
-    """Record in the order of the jobs, whatever the number of workers is."""
-    finished = 0
-    if progress is not None and jobs:
-        progress(0, len(jobs), jobs[0].task)
+def record_into(
+    store: SqliteStore,
+    jobs: Sequence[RecordingJob],
+    workers: int,
+    progress: Progress | None = None,
+) -> int:
+    """Record what a memory does not hold yet; each demonstration is kept as soon as it is made.
 
-    def done(job: RecordingJob) -> None:
-        nonlocal finished
-        finished += 1
-        if progress is not None:
-            progress(finished, len(jobs), job.task)
+    Killed at any moment, the same call goes on with what is left. Several processes may fill one
+    memory: what one of them has recorded the others leave out. The order in which demonstrations
+    come changes nothing.
 
-    if workers <= 1 or len(jobs) == 1:
-        for job in jobs:
-            demonstration = record_one(job)
-            done(job)
-            yield demonstration
+    Args:
+        store: where to.
+        jobs: what is wanted.
+        workers: how many processes.
+        progress: told (done, total, what).
+
+    Returns:
+        How many were recorded now.
+
+    Raises:
+        ForestallError: a run that does not succeed, or a process that died.
+    """
+    wanted = keyed(jobs)
+    left = deque(key for key in wanted if key not in store.recorded())
+    found, tell = len(wanted) - len(left), progress or (lambda done, total, what: None)
+    added = 0
+    if left:
+        tell(found, len(wanted), wanted[left[0]].task)
+    for key, demonstration in _recorded_now(wanted, left, workers, store):
+        store.add(demonstration, key)
+        added += 1
+        tell(found + added, len(wanted), wanted[key].task)
+    return added
+
+
+def _recorded_now(
+    wanted: Mapping[str, RecordingJob], left: deque[str], workers: int, store: SqliteStore
+) -> Iterator[tuple[str, Demonstration]]:
+    """What nobody has recorded when its turn comes, as it comes."""
+    if workers <= 1 or len(left) == 1:
+        for key in left:
+            if key not in store.recorded():
+                yield key, record_one(wanted[key])
         return
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(record_one, job): job for job in jobs}
+    running: dict[Future[Demonstration], str] = {}
+    with pool(min(workers, len(left))) as hands:
         try:
-            for future in as_completed(futures):
-                future.result()
-                done(futures[future])
-            for future in futures:
-                yield future.result()
+            while left or running:
+                while left and len(running) < workers:
+                    key = left.popleft()
+                    if key not in store.recorded():
+                        running[hands.submit(record_one, wanted[key])] = key
+                ended, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in sorted(ended, key=lambda f: f.exception() is not None):
+                    yield running.pop(future), future.result()  # what succeeded is kept first
+        except BrokenProcessPool as error:
+            raise ForestallError(
+                "a process that recorded has died (killed, or out of memory): what was finished "
+                "is kept; run the same command again to go on"
+            ) from error
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            hands.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def keyed(jobs: Sequence[RecordingJob]) -> dict[str, RecordingJob]:
+    """Jobs by what they come to: the sources, the task, the parts, the seeds."""
+    digests: dict[str, str] = {}
+    found = {}
+    for job in jobs:
+        said = repr((job.task, job.given))
+        if said not in digests:
+            digests[said] = _content(job.config(job.first_seed))
+        found[f"{digests[said]} {job.first_seed} {job.tries}"] = job
+    return found
+
+
+def _content(config: RunConfig) -> str:
+    """A digest of everything that a recording could depend on, its seeds apart."""
+    loaded = config.load()
+    parts = [(c.kind, c.name, sorted(c.options.items())) for c in config.choices]
+    parts = [p for p in parts if p[0] in RECORDED]
+    weights = weights_of(p[1] for p in parts)
+    return sources_digest(
+        [forestall.__version__, KITCHENS_PER_TASK, TRIES, repr(loaded), parts, weights]
+    )
 
 
 def load_memory(config: RunConfig, workers: int | None = None) -> tuple[list[Demonstration], str]:
@@ -168,12 +228,23 @@ def load_memory(config: RunConfig, workers: int | None = None) -> tuple[list[Dem
     Raises:
         MemoryFileError: see `memory.store`.
     """
-    path = memory_path(config) or str(ready_made(config, workers=workers))
+    given = memory_path(config)
+    path = given or str(ready_made(config, workers=workers))
+    try:
+        return _demonstrations(config, path), path
+    except MemoryFileError:
+        if given is not None:
+            raise
+    discard(Path(path))  # damaged deep inside, and can be made again
+    return _demonstrations(config, str(ready_made(config, workers=workers))), path
+
+
+def _demonstrations(config: RunConfig, path: str) -> list[Demonstration]:
     store = config.choice(STORE)
     choice = Choice(store.kind, store.name, (*_but_path(store), ("path", path)))
     domain = config.load_domain()
     with closing(Assembly([choice], domain).part(STORE)) as opened:
-        return list(opened.required()), path
+        return list(opened.required())
 
 
 def memory_path(config: RunConfig) -> str | None:
@@ -205,34 +276,69 @@ def ready_made(
         progress: told (done, total, what).
         workers: processes; all cores by default.
     """
-    loaded = config.load()
-    name = loaded.task.name
-    parts = [(c.kind, c.name, sorted(c.options.items())) for c in config.choices]
-    parts = [p for p in parts if p[0] in RECORDED]
-    weights = weights_of(p[1] for p in parts)
-    inputs = [loaded.task, digest_of(loaded.domain), parts, weights]
-    key = sources_digest([forestall.__version__, KITCHENS_PER_TASK, TRIES, *inputs])
-    path = cache_dir() / "memory" / f"{name}-{key}.db"
-    if path.exists():
-        return path
+    name = config.load().task.name
+    path = cache_dir() / "memory" / f"{name}-{_content(config)}.db"
     own = DOMAIN.name if config.domain is None else ""
     said = {c.kind: (c.name, dict(c.given)) for c in config.choices if c.kind != own}
     jobs = jobs_for([config.task], given=_recorded(Given.of(said)))
-    if announce is not None:
-        announce(
-            f"first use of {name}: recording {len(jobs)} demonstrations (once; kept in {path})"
-        )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(f".{os.getpid()}.part")
-    try:
+    wanted = frozenset(keyed(jobs))
+    if _complete(path, wanted):
+        return path
+    tell = announce or (lambda text: None)
+    with _kept_alone(path, lambda who: tell(f"{name}: waiting for {who}, which records it")):
+        if _complete(path, wanted):
+            return path
+        discard(path)  # damaged or empty
+        tell(f"first use of {name}: recording {len(jobs)} demonstrations (once; kept in {path})")
+        partial = path.with_suffix(".part")
+        if not _opens(partial):
+            discard(partial)
         with open_store(partial, create=True) as store:
-            for demonstration in record_all(jobs, workers or os.cpu_count() or 1, progress):
-                store.add(demonstration)
+            record_into(store, jobs, workers or os.cpu_count() or 1, progress)
+        if partial.with_name(partial.name + "-wal").exists():
+            raise MemoryFileError(f"memory {partial} could not be finished: run it again")
         os.replace(partial, path)
-    finally:
-        for leftover in path.parent.glob(f"{partial.name}*"):
-            leftover.unlink(missing_ok=True)
     return path
+
+
+@contextmanager
+def _kept_alone(path: Path, waits: Callable[[str], None]) -> Iterator[None]:
+    """Nobody else makes this memory meanwhile; a cache that cannot be written is said."""
+    with ExitStack() as held:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            held.enter_context(alone(path.parent, path.stem, waits))
+        except OSError as error:
+            raise MemoryFileError(
+                f"the cache {path.parent} cannot be written ({error.strerror}): set "
+                "FORESTALL_CACHE to a folder that can, or name a memory with --memory"
+            ) from error
+        yield
+
+
+def _complete(path: Path, wanted: frozenset[str]) -> bool:
+    """Whether a ready-made memory is there and whole."""
+    if not path.exists():
+        return False
+    try:
+        with open_store(path) as store:
+            return wanted <= store.recorded()
+    except MemoryFileError:
+        return False
+
+
+def _opens(path: Path) -> bool:
+    try:
+        with open_store(path, create=True):
+            return True
+    except MemoryFileError:
+        return False
+
+
+def discard(path: Path) -> None:
+    """Take a memory that can be made again out of the way."""
+    for ending in ("", "-wal", "-shm"):
+        path.with_name(path.name + ending).unlink(missing_ok=True)
 
 
 def _recorded(given: Given) -> Given:

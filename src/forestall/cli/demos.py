@@ -38,7 +38,7 @@ def record(
     jobs: int | None = None,
     quiet: Quiet = False,
 ) -> int:
-    """Run nominal plans in seeded kitchens and keep the successful runs.
+    """Run nominal plans in seeded kitchens and keep the successful runs; goes on after a kill.
 
     Args:
         memory: the demonstration file to add to; made when it does not exist.
@@ -50,7 +50,7 @@ def record(
         quiet: no progress bar.
     """
     from forestall.assembly.configuration import run_config
-    from forestall.assembly.demonstrations import KITCHENS_PER_TASK, jobs_for, record_all
+    from forestall.assembly.demonstrations import KITCHENS_PER_TASK, jobs_for, record_into
     from forestall.cli.progress import bar
     from forestall.config import DEMONSTRATION_SEEDS
     from forestall.errors import InputError
@@ -70,11 +70,9 @@ def record(
     for job in todo[:1]:
         job.config(first)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:
-        count = 0
-        for demonstration in record_all(todo, jobs or os.cpu_count() or 1, feed):
-            store.add(demonstration)
-            count += 1
-    print(f"{count} demonstrations added to {memory}")
+        count = record_into(store, todo, jobs or os.cpu_count() or 1, feed)
+    there = f"; {len(todo) - count} were there" if count < len(todo) else ""
+    print(f"{count} demonstrations added to {memory}{there}")
     return 0
 
 

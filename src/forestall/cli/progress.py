@@ -9,8 +9,11 @@ from contextlib import contextmanager
 
 @contextmanager
 def bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar that is fed with (done, total, what) and shown from the first time on."""
-    if quiet:
+    """A bar that is fed with (done, total, what) and shown from the first time on.
+
+    Where nobody watches there is none.
+    """
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield lambda done, total, what: None
         return
     from rich.console import Console

@@ -44,6 +44,7 @@ def run(
     """
     from forestall.assembly.configuration import run_config
     from forestall.assembly.make import needs_memory, prepare, run_episode
+    from forestall.files import alone
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
@@ -59,13 +60,14 @@ def run(
     strategy = config.choice(STRATEGY).name
     folder = out or _new_folder(prepared.loaded.task.name, name, strategy, config.seed)
     folder.mkdir(parents=True, exist_ok=True)
-    demonstrations, used = memory_of(config, quiet) if needs_memory(config) else (None, None)
     page = folder / "index.html"
-    recorder = RunRecorder(folder, page=str(page))
-    with ProgressLine(quiet=quiet) as line:
-        record = run_episode(prepared, demonstrations, [recorder, line], used)
-    write_page(record, page)
-    data = record_to_json(read_record(folder), page=str(page))
+    with alone(folder):
+        demonstrations, used = memory_of(config, quiet) if needs_memory(config) else (None, None)
+        recorder = RunRecorder(folder, page=str(page))
+        with ProgressLine(quiet=quiet) as line:
+            record = run_episode(prepared, demonstrations, [recorder, line], used)
+        write_page(record, page)
+        data = record_to_json(read_record(folder), page=str(page))
     if as_json:
         print(json.dumps(data, indent=2))
     else:
@@ -81,10 +83,14 @@ def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Pa
     stamp = time.strftime("%Y%m%d-%H%M%S")
     folder = Path("runs") / "-".join((task, scenario or "undisturbed", strategy, str(seed), stamp))
     number = 2
-    while folder.exists():
-        folder = folder.with_name(f"{folder.name.partition('+')[0]}+{number}")
-        number += 1
-    return folder
+    while True:
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:  # of another run that began in this second
+            folder = folder.with_name(f"{folder.name.partition('+')[0]}+{number}")
+            number += 1
+        else:
+            return folder
 
 
 def _summary(data: dict[str, Any]) -> None:

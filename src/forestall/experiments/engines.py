@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from typing import Any, Generic, Protocol, TypeVar
 
 from forestall.errors import InputError, UnknownNameError
+from forestall.processes import pool
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
@@ -46,7 +46,7 @@ class Lane(Protocol):
 
 
 class LocalLane:
-    """A process of its own."""
+    """A process of its own, which ends with this one."""
 
     def __init__(self) -> None:
         self._pool = self._started()
@@ -70,7 +70,7 @@ class LocalLane:
 
     @staticmethod
     def _started() -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+        return pool(1)
 
 
 class InlineLane:

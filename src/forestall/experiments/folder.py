@@ -21,15 +21,14 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Choice
+from forestall.files import alone, replace_file
 from forestall.fingerprint import ROW_MAKING, sources_digest, weights_of
-from forestall.records.record import replace_file
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
 EXPERIMENT = "experiment"
 ABOUT = "experiment.json"
 ROWS = "episodes.jsonl"
 EFFORT = "effort.jsonl"
-LOCK = ".lock"
 
 R = TypeVar("R", bound="Row")
 
@@ -109,6 +108,11 @@ class ResultsFolder(Generic[R]):
                 replace_file(file, json.dumps(about.to_json(), indent=2).encode())
             return {}
         self._check(about)
+        effort = self.path / EFFORT
+        if effort.exists():
+            whole, newline, half = effort.read_bytes().rpartition(b"\n")
+            if half:  # a kill or a full disk; the next line would be joined to it
+                replace_file(effort, whole + newline)
         return self.rows(mend=True)
 
     def about(self) -> dict[str, Any]:
@@ -163,21 +167,10 @@ class ResultsFolder(Generic[R]):
         """Keep other calls of the command out of the folder.
 
         Raises:
-            InputError: one is at work in it.
+            InputError: one is at work in it; says which.
         """
         self._claim()
-        with _room(self.path / LOCK):
-            lock = (self.path / LOCK).open("a", encoding="utf-8")
-        with lock:
-            try:
-                import fcntl
-            except ImportError:  # no such lock on this system
-                yield
-                return
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                raise InputError(f"another experiment is writing to {self.path}") from error
+        with alone(self.path):
             yield
 
     @contextmanager

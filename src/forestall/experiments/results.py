@@ -14,7 +14,7 @@ from forestall.errors import FileFormatError
 from forestall.experiments.folder import ResultsFolder, episodes_in
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
-from forestall.records.record import replace_file
+from forestall.files import replace_file
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import CASE_SETS, cases
 from forestall.statistics.findings import findings

@@ -6,14 +6,13 @@ Called by the store; calls nothing. A file appears complete or not at all.
 from __future__ import annotations
 
 import hashlib
-import os
 import re
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from forestall.errors import InputError, MemoryFileError
+from forestall.files import whole_file
 from forestall.types.observation import Rgb
 
 _HASH = re.compile(r"^[0-9a-f]{32}$")
@@ -46,16 +45,8 @@ class ImageFolder:
             return name
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, partial = tempfile.mkstemp(dir=path.parent, suffix=".part")
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    Image.fromarray(rgb).save(file, format="PNG", compress_level=3)
-                    file.flush()
-                    os.fsync(file.fileno())
-                os.replace(partial, path)
-            except BaseException:
-                Path(partial).unlink(missing_ok=True)
-                raise
+            with whole_file(path) as file:
+                Image.fromarray(rgb).save(file, format="PNG", compress_level=3)
         except OSError as error:
             raise MemoryFileError(f"cannot keep a picture in {self.folder}: {error}") from error
         return name

@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 import sqlite3
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -54,6 +55,14 @@ CREATE TABLE steps (
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX demonstrations_by_task ON demonstrations(task);
 """
+
+_RECORDINGS = """
+CREATE TABLE IF NOT EXISTS recordings (
+    job TEXT PRIMARY KEY,
+    demonstration TEXT NOT NULL REFERENCES demonstrations(id) ON DELETE CASCADE
+) STRICT
+"""
+"""What was recorded for what; made with the first, so that a memory without it is read as well."""
 
 _MAGIC = b"SQLite format 3\x00"
 
@@ -124,11 +133,15 @@ class SqliteStore:
             row = self._connection.execute("SELECT count(*) FROM demonstrations").fetchone()
         return int(row[0])
 
-    def add(self, demonstration: Demonstration) -> str:
+    def add(self, demonstration: Demonstration, job: str | None = None) -> str:
         """Store one successful run in one transaction; returns its id.
 
         A demonstration without an id gets one made of its task and content, so that adding the
         same run twice keeps it once.
+
+        Args:
+            demonstration: the run.
+            job: what it was recorded for, so that nobody records it again.
 
         Raises:
             MemoryFileError: read-only, locked by another process, the disk is full, or the id
@@ -147,7 +160,21 @@ class SqliteStore:
                 raise MemoryFileError(f"memory {self.path} has another demonstration named {name}")
             if old is None:
                 self._insert(name, digest, encoded)
+            if job is not None:
+                self._connection.execute(_RECORDINGS)
+                self._connection.execute(
+                    "INSERT OR REPLACE INTO recordings VALUES (?, ?)", (job, name)
+                )
         return name
+
+    def recorded(self) -> frozenset[str]:
+        """The jobs whose demonstrations are there."""
+        with self._errors():
+            made = "SELECT count(*) FROM sqlite_master WHERE name = 'recordings'"
+            if not self._connection.execute(made).fetchone()[0]:
+                return frozenset()
+            rows = self._connection.execute("SELECT job FROM recordings").fetchall()
+        return frozenset(row[0] for row in rows)
 
     def all(self) -> Sequence[Demonstration]:
         """Every demonstration in id order.
@@ -239,13 +266,12 @@ class SqliteStore:
     def _prepare(self) -> None:
         """Check what the file is; write the schema into a new one."""
         with self._errors():
-            application, version = self._marks()
-            if self._writable and (application, version) == (0, 0) and not self._tables():
-                self._connection.execute("PRAGMA journal_mode = WAL")
+            if self._writable and self._marks() == (0, 0) and not self._tables():
+                self._log_ahead()
                 with self._transaction():
                     if not self._tables():
                         self._make()
-                application, version = self._marks()
+            application, version = self._marks()
             if application != APPLICATION_ID:
                 raise MemoryFileError(
                     f"{self.path} is a SQLite file, but not a memory of forestall"
@@ -258,6 +284,18 @@ class SqliteStore:
             problem = self._connection.execute("PRAGMA quick_check(1)").fetchone()[0]
             if problem != "ok":
                 raise MemoryFileError(f"memory {self.path} is damaged: {problem}")
+
+    def _log_ahead(self) -> None:
+        """Set the journal mode; of many that make one memory SQLite lets all but one fail here."""
+        deadline = time.monotonic() + self._busy_timeout_s
+        while True:
+            try:
+                self._connection.execute("PRAGMA journal_mode = WAL")
+                return
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error) or time.monotonic() > deadline:
+                    raise
+                time.sleep(0.01)
 
     def _marks(self) -> tuple[int, int]:
         execute = self._connection.execute
@@ -318,7 +356,7 @@ class SqliteStore:
             raise MemoryFileError(f"memory {self.path}: {error}") from error
         except sqlite3.Error as error:
             text = str(error)
-            if "locked" in text or "busy" in text:
+            if "lock" in text or "busy" in text:
                 raise MemoryFileError(
                     f"memory {self.path} is being written by another process "
                     f"(waited {self._busy_timeout_s:g} s): try again later"

@@ -9,13 +9,13 @@ by the one codec (`codec.py`).
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError, InputError
+from forestall.files import replace_file
 from forestall.records.boundaries import boundary_json, by_reference, executed_json
 from forestall.records.codec import (
     KIND,
@@ -42,11 +42,12 @@ IMAGES_NAME = "images"
 class RunRecorder:
     """Listener that keeps a run readable at every moment.
 
-    `on_start` empties what an earlier run left in the same folder.
+    `on_start` takes away what an earlier run left in the same folder, its page first: no page
+    is left beside the record of another run.
 
     Args:
-        folder: made when the run starts.
-        page: where the page of this run will be, relative to the folder.
+        folder: made when the run starts; nobody else writes to it (`files.alone`).
+        page: where the page of this run will be; its file lies in the folder.
     """
 
     def __init__(self, folder: Path | str, *, page: str | None = None) -> None:
@@ -58,7 +59,9 @@ class RunRecorder:
     def on_start(self, record: EpisodeRecord) -> None:
         """The episode begins."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        (self.folder / RECORD_NAME).unlink(missing_ok=True)
+        for name in (Path(self._page or "").name, RECORD_NAME):
+            if name:
+                (self.folder / name).unlink(missing_ok=True)
         (self.folder / LINES_NAME).write_text("", encoding="utf-8")
         self._started = True
         self._stored = []
@@ -164,20 +167,6 @@ def read_record(path: Path | str) -> EpisodeRecord:
         return record_from_json(load_json(text))
     except FileFormatError as error:
         raise FileFormatError(f"{path}: {error}") from error
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file so that it is never seen half written."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 def _stored(folder: Path, boundary: BoundaryRecord) -> BoundaryRecord:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from forestall.records.record import replace_file
+from forestall.files import replace_file
 from forestall.report.experiment_view import View, experiment_view
 from forestall.report.figure_style import colours_css, inline_svg
 

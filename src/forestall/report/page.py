@@ -12,8 +12,8 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from forestall.files import replace_file
 from forestall.records.derived import in_words
-from forestall.records.record import replace_file
 from forestall.report.graph_svg import graph_css
 from forestall.report.page_view import duration, page_view, status_sign
 from forestall.types.episode import EpisodeRecord

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from forestall.records.record import replace_file
+from forestall.files import replace_file
 from forestall.training.measure import UNOBSERVED, Figures, Group, Measurement, Share
 
 JSON_NAME, MARKDOWN_NAME = "measurement.json", "measurement.md"

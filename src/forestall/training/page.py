@@ -19,7 +19,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from forestall.errors import InputError
-from forestall.records.record import replace_file
+from forestall.files import replace_file
 from forestall.training.measure import (
     UNOBSERVED,
     Answers,

@@ -16,7 +16,7 @@ import numpy as np
 from forestall.domain.model import Domain
 from forestall.embeddings.twotower import DESCRIPTION_NAME, Description, TwoTowerEncoder
 from forestall.errors import InputError
-from forestall.records.record import replace_file
+from forestall.files import replace_file
 from forestall.training import shards
 from forestall.training.examine import answers, large_only, logits, vectors
 from forestall.training.fitting import fit_temperature, fit_threshold

@@ -8,13 +8,12 @@ a folder depend on nothing but their seeds and the options that stand beside the
 from __future__ import annotations
 
 import json
-import os
 import tomllib
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, field
 from importlib.resources import files
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -26,9 +25,10 @@ from forestall.config import PICTURE_SEEDS
 from forestall.domain.load import extend, shipped
 from forestall.domain.model import Domain
 from forestall.embeddings.crops import MARGIN, crop, whole
-from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.errors import FileFormatError, ForestallError, InputError, UnknownNameError
+from forestall.files import alone, replace_file, whole_file
 from forestall.perception.segmenters import InstanceSegmenter
-from forestall.records.record import replace_file
+from forestall.processes import pool
 from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, Picture, SceneConfig
 
@@ -107,10 +107,16 @@ def make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> 
     """Make every shard that is not there yet, development and test first.
 
     Raises:
-        InputError: the folder holds pictures made with other options.
+        InputError: the folder holds pictures made with other options, or another process is
+            writing to it.
     """
     out.mkdir(parents=True, exist_ok=True)
-    _same_options(out, config)
+    with alone(out):
+        _same_options(out, config)
+        _make(out, config, workers, progress)
+
+
+def _make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> None:
     todo = [
         (split, first)
         for split in ("development", "test", "unseen", "train")
@@ -120,14 +126,19 @@ def make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> 
     progress(len(todo) - len(left), len(todo), "pictures")
     if not left:
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(make_shard, out, config, *job): job for job in left}
+    with pool(min(workers, len(left))) as hands:
+        futures = {hands.submit(make_shard, out, config, *job): job for job in left}
         try:
             for done, future in enumerate(as_completed(futures), len(todo) - len(left) + 1):
                 future.result()
                 progress(done, len(todo), futures[future][0])
+        except BrokenProcessPool as error:
+            raise ForestallError(
+                "a process that drew has died (killed, or out of memory): what was finished is "
+                "kept; run the same command again to go on"
+            ) from error
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            hands.shutdown(wait=False, cancel_futures=True)
             raise
 
 
@@ -146,8 +157,7 @@ def make_shard(out: Path, config: PictureConfig, split: str, first: int) -> Path
             frames += 1
     path = _path(out, split, first)
     path.parent.mkdir(exist_ok=True)
-    partial = path.with_suffix(f".{os.getpid()}.part")
-    with partial.open("wb") as file:
+    with whole_file(path) as file:
         np.savez(
             file,
             pixels=np.stack([r.pixels for r in rows]),
@@ -156,7 +166,6 @@ def make_shard(out: Path, config: PictureConfig, split: str, first: int) -> Path
             area=np.array([r.area for r in rows], dtype=np.int32),
             frame=np.array([r.frame for r in rows], dtype=np.int32),
         )
-    os.replace(partial, path)
     return path
 
 
