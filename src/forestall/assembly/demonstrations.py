@@ -21,6 +21,7 @@ from forestall.assembly.make import prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.domain.model import Domain
+from forestall.domain.toml_out import domain_toml
 from forestall.embeddings.views import view_of
 from forestall.errors import ForestallError, MemoryFileError
 from forestall.files import alone
@@ -169,7 +170,7 @@ def _recorded_now(
     wanted: Mapping[str, RecordingJob], left: deque[str], workers: int, store: SqliteStore
 ) -> Iterator[tuple[str, Demonstration]]:
     """What nobody has recorded when its turn comes, as it comes."""
-    if workers <= 1 or len(left) == 1:
+    if workers <= 1 or len(left) <= 1:
         for key in left:
             if key not in store.recorded():
                 yield key, record_one(wanted[key])
@@ -213,9 +214,8 @@ def _content(config: RunConfig) -> str:
     parts = [(c.kind, c.name, sorted(c.options.items())) for c in config.choices]
     parts = [p for p in parts if p[0] in RECORDED]
     weights = weights_of(p[1] for p in parts)
-    return sources_digest(
-        [forestall.__version__, KITCHENS_PER_TASK, TRIES, repr(loaded), parts, weights]
-    )
+    inputs = [loaded.task, domain_toml(loaded.domain), parts, weights]
+    return sources_digest([forestall.__version__, KITCHENS_PER_TASK, TRIES, *inputs])
 
 
 def load_memory(config: RunConfig, workers: int | None = None) -> tuple[list[Demonstration], str]:
