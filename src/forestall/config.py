@@ -37,7 +37,10 @@ def cache_dir() -> Path:
         return Path(override)
     from platformdirs import user_cache_path
 
-    path = user_cache_path("forestall", appauthor=False)
+    try:
+        path = user_cache_path("forestall", appauthor=False)
+    except RuntimeError:  # so say some versions
+        path = Path()
     if not path.is_absolute():
         raise ForestallError("there is no home folder for the cache: set FORESTALL_CACHE to one")
     return path

@@ -31,23 +31,49 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         OSError: it cannot be written; names the file.
     """
     partial = path.with_name(f".{uuid4().hex}.part")
+    with naming(path):
+        try:
+            with partial.open("xb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(partial, path)
+        except BaseException:
+            partial.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Say which file could not be written; a full disk does not say it by itself.
+
+    Raises:
+        OSError: with the file's name.
+    """
     try:
-        with partial.open("xb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(partial, path)
-    except BaseException as error:
-        partial.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
-        raise
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 def replace_file(path: Path, data: bytes) -> None:
     """Write a file so that it is never seen half written."""
     with whole_file(path) as file:
         file.write(data)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that something is to be written to, unless it is there.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written to ({error.strerror}): name another folder"
+        ) from error
 
 
 @contextmanager
@@ -111,4 +137,4 @@ def _tidy(folder: Path) -> None:
         folders[:] = [f for f in folders if not Path(place, f, LOCK).exists()]
 
 
-__all__ = ["LOCK", "alone", "replace_file", "whole_file"]
+__all__ = ["LOCK", "alone", "make_folder", "naming", "replace_file", "whole_file"]

@@ -15,7 +15,7 @@ from experiments.episodes import DEADLY, computed_row, deadly_row
 from forestall.assembly.configuration import Given
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
-from forestall.experiments.folder import ABOUT, ROWS, ResultsFolder, episodes_in
+from forestall.experiments.folder import ABOUT, EFFORT, ROWS, ResultsFolder, episodes_in
 from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
 from forestall.statistics.cases import CASE_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
@@ -132,6 +132,18 @@ def test_two_commands_do_not_write_to_one_folder(tmp_path: Path) -> None:
         pytest.raises(InputError, match="written by process"),
     ):
         play(SMALL, tmp_path)
+
+
+def test_a_call_that_was_killed_while_it_noted_itself_is_no_call(tmp_path: Path) -> None:
+    play(SMALL, tmp_path)
+    calls = episodes_in(tmp_path).asked()
+    rows = (tmp_path / ROWS).read_text().splitlines(keepends=True)
+    (tmp_path / ROWS).write_text("".join(rows[:-1]))
+    with (tmp_path / EFFORT).open("a") as lines:
+        lines.write('{"choice": {"exp')
+    play(SMALL, tmp_path)
+    assert episodes_in(tmp_path).asked() == calls
+    assert "episodes" in episodes_in(tmp_path).effort()["duration"]
 
 
 def test_reading_while_another_writes_takes_nothing_away(tmp_path: Path) -> None:

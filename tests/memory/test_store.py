@@ -7,8 +7,11 @@ import sqlite3
 import subprocess
 import sys
 import zlib
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -382,3 +385,45 @@ def test_pictures_where_no_folder_can_be(path: Path) -> None:
         store.images.folder.write_text("a file in the way")
         with pytest.raises(MemoryFileError, match="cannot keep a picture"):
             store.put_image(picture(0))
+
+
+def test_a_new_memory_is_opened_by_many_at_once(tmp_path: Path) -> None:
+    for round_ in range(8):
+        path, ready = tmp_path / f"{round_}.db", Barrier(8)
+
+        def write(seed: int, path: Path = path, ready: Barrier = ready) -> None:
+            ready.wait()
+            with open_store(path, create=True) as store:
+                store.add(demonstration("t", seed, PLAN))
+
+        with ThreadPoolExecutor(8) as threads:
+            list(threads.map(write, range(8)))
+        with open_store(path) as store:
+            assert [d.seed for d in store.all()] and len(store) == 8
+
+
+def test_one_that_was_killed_before_its_tables_were_made_is_made(path: Path) -> None:
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA journal_mode = WAL")
+    with open_store(path) as store:
+        assert len(store) == 0
+
+
+def test_what_something_was_recorded_for_is_kept_with_it_or_not_at_all(path: Path) -> None:
+    filled(path)
+    with open_store(path) as store:
+        assert store.recorded() == frozenset()
+        store.add(replace(ONE, seed=9), "a job")
+        store.add(replace(ONE, seed=9), "the same, asked otherwise")
+        assert len(store) == 3
+    with open_store(path) as store:
+        assert store.recorded() == {"a job", "the same, asked otherwise"}
+
+    class Broken(SqliteStore):
+        def _insert(self, *arguments: object) -> None:
+            raise sqlite3.OperationalError("disk I/O error")
+
+    with Broken(path, 1.0, True) as broken, pytest.raises(MemoryFileError, match="disk full"):
+        broken.add(replace(ONE, seed=10), "another job")
+    with open_store(path) as store:
+        assert len(store.recorded()) == 2

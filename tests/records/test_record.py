@@ -188,6 +188,16 @@ def test_a_second_run_in_the_same_folder_replaces_the_first(tmp_path: Path) -> N
     assert len(found.boundaries) == 2
 
 
+def test_no_page_stays_beside_the_record_of_another_run(tmp_path: Path) -> None:
+    write_record(tmp_path, records.potato_record())
+    (tmp_path / "index.html").touch()
+    for page in ("index.html", str(tmp_path / "index.html")):
+        (tmp_path / "index.html").touch()
+        records.follow(RunRecorder(tmp_path, page=page), records.potato_record(), 1)
+        assert not (tmp_path / "index.html").exists()
+        assert not (tmp_path / RECORD_NAME).exists()
+
+
 def test_a_recorder_must_be_started(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="on_start"):
         RunRecorder(tmp_path).on_executed(records.potato_record().executed[0], 1.0)

@@ -44,7 +44,7 @@ def run(
     """
     from forestall.assembly.configuration import run_config
     from forestall.assembly.make import needs_memory, prepare, run_episode
-    from forestall.files import alone
+    from forestall.files import alone, make_folder
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
@@ -59,7 +59,7 @@ def run(
     name = None if prepared.scenario is None else prepared.scenario.name
     strategy = config.choice(STRATEGY).name
     folder = out or _new_folder(prepared.loaded.task.name, name, strategy, config.seed)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     page = folder / "index.html"
     with alone(folder):
         demonstrations, used = memory_of(config, quiet) if needs_memory(config) else (None, None)
@@ -80,12 +80,15 @@ def _count(number: int, what: str) -> str:
 
 
 def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Path:
+    from forestall.files import make_folder
+
     stamp = time.strftime("%Y%m%d-%H%M%S")
     folder = Path("runs") / "-".join((task, scenario or "undisturbed", strategy, str(seed), stamp))
+    make_folder(folder.parent)
     number = 2
     while True:
         try:
-            folder.mkdir(parents=True)
+            folder.mkdir()
         except FileExistsError:  # of another run that began in this second
             folder = folder.with_name(f"{folder.name.partition('+')[0]}+{number}")
             number += 1

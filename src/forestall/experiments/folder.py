@@ -21,7 +21,7 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Choice
-from forestall.files import alone, replace_file
+from forestall.files import alone, make_folder, replace_file
 from forestall.fingerprint import ROW_MAKING, sources_digest, weights_of
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
@@ -178,8 +178,11 @@ class ResultsFolder(Generic[R]):
         """The open file of rows; hand it to `add`."""
         with _room(self.path / ROWS):
             lines = (self.path / ROWS).open("a", encoding="utf-8")
-        with lines:
+        try:
             yield lines
+        finally:
+            with _room(self.path / ROWS):  # what did not fit is tried once more
+                lines.close()
 
     def add(self, lines: IO[str], row: R) -> None:
         """Write one episode."""
@@ -256,10 +259,7 @@ class ResultsFolder(Generic[R]):
 
     def _claim(self) -> None:
         """See that the folder can be one of results, and make it."""
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be a folder of results: {error}") from error
+        make_folder(self.path)
         others = [p.name for p in self.path.iterdir() if not p.name.startswith((".", ABOUT))]
         if others and not (self.path / ABOUT).exists():
             raise InputError(

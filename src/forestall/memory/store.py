@@ -365,6 +365,10 @@ class SqliteStore:
                 raise MemoryFileError(f"memory {self.path} cannot be written: {text}") from error
             if "full" in text:
                 raise MemoryFileError(f"no space left for memory {self.path}: {text}") from error
+            if "disk I/O" in text:
+                raise MemoryFileError(
+                    f"memory {self.path} cannot be read or written: {text}: is the disk full?"
+                ) from error
             raise MemoryFileError(f"memory {self.path} is damaged: {text}") from error
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError, InputError
-from forestall.files import replace_file
+from forestall.files import naming, replace_file
 from forestall.records.boundaries import boundary_json, by_reference, executed_json
 from forestall.records.codec import (
     KIND,
@@ -108,7 +108,8 @@ class RunRecorder:
         if not self._started:
             raise InputError("the recorder has not been started: call on_start first")
         # Opened for each line: a run that raises leaves nothing open and nothing unwritten.
-        with (self.folder / LINES_NAME).open("a", encoding="utf-8", newline="\n") as lines:
+        path = self.folder / LINES_NAME
+        with naming(path), path.open("a", encoding="utf-8", newline="\n") as lines:
             lines.write(_dumps({"event": what, **fields}) + "\n")
             lines.flush()
 

@@ -26,7 +26,7 @@ from forestall.domain.load import extend, shipped
 from forestall.domain.model import Domain
 from forestall.embeddings.crops import MARGIN, crop, whole
 from forestall.errors import FileFormatError, ForestallError, InputError, UnknownNameError
-from forestall.files import alone, replace_file, whole_file
+from forestall.files import alone, make_folder, replace_file, whole_file
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.processes import pool
 from forestall.training.questions import ATTRIBUTES
@@ -110,7 +110,7 @@ def make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> 
         InputError: the folder holds pictures made with other options, or another process is
             writing to it.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     with alone(out):
         _same_options(out, config)
         _make(out, config, workers, progress)
