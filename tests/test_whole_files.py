@@ -85,7 +85,8 @@ def test_a_lock_goes_with_its_process_whatever_ids_there_are(tmp_path: Path) -> 
 
 
 def test_it_can_be_waited_for(tmp_path: Path) -> None:
-    told, order = [], []
+    told: list[str] = []
+    order: list[str] = []
 
     def later() -> None:
         with alone(tmp_path, waits=told.append):

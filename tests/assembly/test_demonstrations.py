@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,21 +92,6 @@ def test_several_processes_make_the_same_memory(tmp_path: Path) -> None:
             assert record_into(store, JOBS, workers) == 0
             digests.append(store.digest())
     assert digests[0] == digests[1]
-
-
-@pytest.mark.slow
-def test_a_recording_is_the_same_one_in_every_process() -> None:
-    code = (
-        "from forestall.assembly.demonstrations import *\n"
-        f"print(*keyed(jobs_for(['{TASK}', 'make-coffee'])), sep='\\n')"
-    )
-    keys = {
-        subprocess.check_output(
-            [sys.executable, "-c", code], env=os.environ | {"PYTHONHASHSEED": seed}
-        )
-        for seed in ("1", "2")
-    }
-    assert len(keys) == 1
 
 
 def emptied(path: Path) -> None:

@@ -78,16 +78,16 @@ def test_its_demonstrations_are_recorded_in_it_and_keyed_by_its_content(blowing:
     assert record_one(job).task == "fasten-plate"
 
 
-def test_the_key_is_the_same_in_every_process() -> None:
+def test_the_key_is_the_same_in_every_process(tmp_path: Path) -> None:
     code = (
         "import forestall.assembly.demonstrations as d, sys;"
-        "d.record_all = lambda *a: sys.exit(0);"
+        "d.record_into = lambda *a: sys.exit(0);"
         "d.ready_made(d.run_config('fasten-plate'), announce=print)"
     )
     told = {
         subprocess.run(
             [sys.executable, "-c", code],
-            env={**os.environ, "PYTHONHASHSEED": seed, "FORESTALL_CACHE": "absent-cache"},
+            env={**os.environ, "PYTHONHASHSEED": seed, "FORESTALL_CACHE": str(tmp_path)},
             capture_output=True,
             text=True,
             check=True,

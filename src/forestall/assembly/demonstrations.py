@@ -21,7 +21,6 @@ from forestall.assembly.make import prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.domain.model import Domain
-from forestall.domain.toml_out import domain_toml
 from forestall.embeddings.views import view_of
 from forestall.errors import ForestallError, MemoryFileError
 from forestall.files import alone
@@ -214,7 +213,7 @@ def _content(config: RunConfig) -> str:
     parts = [(c.kind, c.name, sorted(c.options.items())) for c in config.choices]
     parts = [p for p in parts if p[0] in RECORDED]
     weights = weights_of(p[1] for p in parts)
-    inputs = [loaded.task, domain_toml(loaded.domain), parts, weights]
+    inputs = [loaded.task, digest_of(loaded.domain), parts, weights]
     return sources_digest([forestall.__version__, KITCHENS_PER_TASK, TRIES, *inputs])
 
 
