@@ -111,7 +111,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(
 ) -> None:
     (tmp_path / "file").write_text("x")
     out = tmp_path / "file" / "run"
-    assert call(["run", "toast-bread", "--strategy", "none", "--out", str(out)]) == 3
+    assert call(["run", "toast-bread", "--strategy", "none", "--out", str(out)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 

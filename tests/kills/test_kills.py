@@ -21,17 +21,28 @@ pytestmark = [
 ]
 KILLS = int(os.environ.get("FORESTALL_KILLS", "8"))
 CASES = [(name, together) for name in VICTIMS for together in (1, 2)]
+UNDISTURBED: dict[str, tuple[frozenset[str], float]] = {}
+"""Command → what it makes, and how long it takes."""
+
 FRESH = 4
 """A folder is killed over so many times at most before the command may finish in it."""
 
 
-@pytest.mark.parametrize(("name", "together"), CASES)
+@pytest.mark.parametrize(
+    ("name", "together"), [pytest.param(*c, marks=pytest.mark.xdist_group(c[0])) for c in CASES]
+)
 def test_nothing_finished_is_lost_or_doubled(
-    name: str, together: int, tmp_path: Path, record_property: Callable[[str, object], None]
+    name: str,
+    together: int,
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    record_property: Callable[[str, object], None],
 ) -> None:
     victim = VICTIMS[name]
     rng = np.random.default_rng((CASES.index((name, together)), 10))
-    whole, seconds = _undisturbed(victim, tmp_path / "whole")
+    if name not in UNDISTURBED:
+        UNDISTURBED[name] = _undisturbed(victim, tmp_path_factory.mktemp(name))
+    whole, seconds = UNDISTURBED[name]
     kills, places = 0, count()
     while kills < -(-KILLS // len(CASES)):
         folder = tmp_path / str(next(places))
@@ -53,7 +64,6 @@ def test_nothing_finished_is_lost_or_doubled(
 
 
 def _undisturbed(victim: Victim, folder: Path) -> tuple[frozenset[str], float]:
-    folder.mkdir()
     started = time.monotonic()
     code, said = victim.start(folder).end()
     assert code == 0, said

@@ -104,11 +104,12 @@ def _encoder() -> dict[str, Any]:
 
 
 def _writable(folder: Any) -> tuple[bool, str]:
+    import tempfile
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".probe"
-        probe.write_text("x")
-        probe.unlink()
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(b"x")
     except OSError as error:
         return False, str(error)
     return True, str(folder)

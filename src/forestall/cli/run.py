@@ -48,7 +48,7 @@ def run(
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
     from forestall.records.listeners import ProgressLine
-    from forestall.records.record import RunRecorder, read_record
+    from forestall.records.record import RECORD_NAME, RunRecorder, read_record, write_record
     from forestall.report.page import write_page
 
     given, of_run = parts.read()
@@ -66,6 +66,8 @@ def run(
         recorder = RunRecorder(folder, page=str(page))
         with ProgressLine(quiet=quiet) as line:
             record = run_episode(prepared, demonstrations, [recorder, line], used)
+        if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
+            write_record(folder, record, page=str(page))
         write_page(record, page)
         data = record_to_json(read_record(folder), page=str(page))
     if as_json:

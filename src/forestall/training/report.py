@@ -18,6 +18,7 @@ import numpy as np
 from forestall.domain.load import load_domain
 from forestall.embeddings.crops import INPUT_PIXELS, crops
 from forestall.embeddings.twotower import TOWERS, TwoTowerEncoder, shipped
+from forestall.files import replace_file
 from forestall.training import shards, words, zero_shot
 from forestall.training.examine import Vectors, answers, vectors
 from forestall.training.measure import measure
@@ -68,7 +69,7 @@ def examine(
         "words": [asdict(w) for w in near],
     }
     write_tables(found, out)
-    (out / "encoder.json").write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    replace_file(out / "encoder.json", (json.dumps(data, indent=2) + "\n").encode())
     facts = {
         "encoder": encoder.name,
         "pictures": f"{split}: {len(there.frame)} crops of {int(there.frame[-1]) + 1} frames",
