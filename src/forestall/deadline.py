@@ -41,7 +41,12 @@ class Deadline:
     @property
     def over(self) -> bool:
         """Whether to stop now."""
-        return time.monotonic() >= self._at_s or self.cancelled
+        outer = self._outer
+        return (
+            self._cancelled
+            or time.monotonic() >= self._at_s
+            or (outer is not None and outer.cancelled)
+        )
 
     @property
     def cancelled(self) -> bool:

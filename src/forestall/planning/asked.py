@@ -87,13 +87,17 @@ class Asked:
 
     def derived(self, predicate: str, args: tuple[str, ...]) -> Node:
         """Whether a derived fact holds."""
+        members = self.domain.recursive.get(predicate)
+        circle = None if members is None else self._circles.get(members)
+        if circle is not None:
+            return circle.ask(self.domain.predicates[predicate], args) == TRUE
+        return self.state.follow((predicate, *args), lambda: self._derived(predicate, args))
+
+    def _derived(self, predicate: str, args: tuple[str, ...]) -> bool | Node:
         known = self.domain.predicates[predicate]
         members = self.domain.recursive.get(predicate)
         if members is None:
             return self._defined(known, args)
-        circle = self._circles.get(members)
-        if circle is not None:
-            return circle.ask(known, args) == TRUE
         circle = Circle(lambda k, those: TRUE if self._defined(k, those) is True else FALSE)
         self._circles[members] = circle
         try:

@@ -9,19 +9,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
+from forestall.deadline import Deadline
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.problem import Operator, Problem
 from forestall.planning.state import State, by_number
 from forestall.types.facts import category_of
 from forestall.types.plan import Subtask
 
+HURRY_S = 0.1
+"""With less time than this a plan is not improved any more."""
 
-def gathered(problem: Problem, state: State, steps: list[Operator]) -> list[Operator]:
-    """Do things where the robot is anyway, if that saves driving.
+
+def gathered(
+    problem: Problem, state: State, steps: list[Operator], deadline: Deadline
+) -> list[Operator]:
+    """Do things where the robot is anyway, if that saves driving and there is time.
 
     A step moves up behind the last step at its place, where the plan still works.
     """
     for i, step in enumerate(steps):
+        if deadline.left() < HURRY_S:
+            break
         if step.over is not None or not step.subtask.args:
             continue
         place = _place(state, step.subtask.args[-1])
@@ -75,11 +83,17 @@ def _holds(state: State, predicate: str, *args: str) -> bool:
 
 
 def with_driving(
-    state: State, operators: Sequence[Operator], loose: frozenset[str] = frozenset()
+    state: State,
+    operators: Sequence[Operator],
+    loose: frozenset[str] = frozenset(),
+    deadline: Deadline | None = None,
 ) -> tuple[tuple[Subtask, ...], State | None, str]:
     """Insert driving, executing along; the final state is None if a step does not run.
 
     A support in `loose` is named by its category: any other of its kind with room would do.
+
+    Raises:
+        TimeUp: the deadline is over.
     """
     plan: list[Subtask] = []
     where: str | None = None
@@ -96,13 +110,15 @@ def with_driving(
             place = _place(state, subject)
             held = {h for _, h in state.in_hands()}
             if driving is not None and (place != where or over) and subject not in held:
-                landmark = over or _landmark(state, subject)
+                landmark = over or landmark_of(state, subject)
                 steps_here.insert(0, Subtask(driving.name, (landmark,)))
             where = place
             first = place == subject and place in loose
             if first and place and state.instances(state.kinds[place])[0] == place:
                 steps_here = [_renamed(s, place, state.kinds[place]) for s in steps_here]
         for step in steps_here:
+            if deadline is not None:
+                deadline.check()
             after = apply(state, step)
             if isinstance(after, Refusal):
                 return tuple(plan), None, f"{step} does not run: {after.reason}"
@@ -128,7 +144,7 @@ def _renamed(subtask: Subtask, old: str, new: str) -> Subtask:
     return Subtask(subtask.skill, tuple(new if a == old else a for a in subtask.args))
 
 
-def _landmark(state: State, name: str) -> str:
+def landmark_of(state: State, name: str) -> str:
     """What to drive to for a thing: the container that it is inside, else itself."""
     domain = state.domain
     inside = next((r for r in domain.containing), None)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from forestall.deadline import Deadline
 from forestall.domain.formula import Formula, Not, literals
 from forestall.planning.state import State, by_number
 from forestall.types.facts import Literal, category_of, is_instance
@@ -40,7 +41,12 @@ def makeable(state: State) -> Made:
     """(source, skill, variable) → names of what the skill would make of the source.
 
     Every source gets names of its own, the most promising one the names that `apply` would give.
+    Worked out once for each state.
     """
+    return state.follow("makeable", lambda: _makeable(state))
+
+
+def _makeable(state: State) -> Made:
     domain = state.domain
     made: dict[tuple[str, str, str], tuple[str, ...]] = {}
     number: dict[str, int] = {}
@@ -75,15 +81,21 @@ def _promise(state: State, name: str) -> tuple[bool, bool, bool, tuple[str, int]
     return name in state.lost or harmed, not held and shut_in, not held, by_number(name)
 
 
-def alternatives(state: State, goal: Goal, whole: bool = False) -> Alternatives:
+def alternatives(
+    state: State, goal: Goal, whole: bool = False, deadline: Deadline | None = None
+) -> Alternatives:
     """Ground conjunctions of which any one meets the goal (`never` included as negations).
 
     Args:
         state: says what exists.
         goal: with variables and category names.
         whole: count what any source could make, and not only the most promising one.
+        deadline: when to stop.
+
+    Raises:
+        TimeUp: it is over.
     """
-    options = _Options(state, whole)
+    options = _Options(state, whole, deadline or Deadline())
     parts: list[Formula] = [_plain(x) for x in goal.literals] + [_negated(x) for x in goal.never]
     variables = list(goal.variables)
     ground: list[Formula] = []
@@ -109,6 +121,68 @@ def alternatives(state: State, goal: Goal, whole: bool = False) -> Alternatives:
             return Alternatives(tuple(found), False)
         found.append(conjunction)
     return Alternatives(tuple(found))
+
+
+def different(
+    choices: Sequence[Sequence[str]], distinct: Sequence[bool]
+) -> Iterator[tuple[str, ...]]:
+    """One of each of the choices in the order of `product`, those that are `distinct` different.
+
+    Only what leaves something for all the others is followed: the first come at once, and that
+    there are none is seen at once, however many choices there are.
+    """
+    several = list(zip(choices, distinct, strict=True))
+
+    def fitting(at: int, taken: frozenset[str]) -> Iterator[tuple[str, frozenset[str]]]:
+        names, alone = several[at]
+        rest = [c for c, d in several[at + 1 :] if d]
+        for name in names:
+            if not alone:
+                yield name, taken
+            elif name not in taken and assigned(rest, now := taken | {name}):
+                yield name, now
+
+    if not assigned([c for c, d in several if d]):
+        return
+    if not several:
+        yield ()
+        return
+    chosen: list[str] = []
+    waiting = [fitting(0, frozenset())]
+    while waiting:
+        found = next(waiting[-1], None)
+        del chosen[len(waiting) - 1 :]
+        if found is None:
+            waiting.pop()
+            continue
+        chosen.append(found[0])
+        if len(chosen) == len(several):
+            yield tuple(chosen)
+        else:
+            waiting.append(fitting(len(chosen), found[1]))
+
+
+def assigned(choices: Sequence[Sequence[str]], taken: frozenset[str] = frozenset()) -> bool:
+    """Whether all choices can be given different things, none of those that are taken."""
+    used = set(taken)
+    for several in sorted(choices, key=len):
+        name = next((x for x in several if x not in used), None)
+        if name is None:
+            return _matched([[x for x in c if x not in taken] for c in choices])
+        used.add(name)
+    return True
+
+
+def _matched(choices: Sequence[Sequence[str]]) -> bool:
+    if len({x for several in choices for x in several}) < len(choices):
+        return False
+    import networkx as nx
+
+    graph = nx.Graph()
+    graph.add_nodes_from(range(len(choices)))
+    graph.add_edges_from((i, x) for i, several in enumerate(choices) for x in several)
+    found = nx.bipartite.hopcroft_karp_matching(graph, range(len(choices)))
+    return len(found) == 2 * len(choices)
 
 
 def negated(part: Formula) -> Literal | None:
@@ -144,8 +218,8 @@ def _literal(part: Formula) -> Literal:
 class _Options:
     """Which things a name in a goal can mean."""
 
-    def __init__(self, state: State, whole: bool) -> None:
-        self.state, self.whole = state, whole
+    def __init__(self, state: State, whole: bool, deadline: Deadline) -> None:
+        self.state, self.whole, self.deadline = state, whole, deadline
         self.made = makeable(state)
         self.first: dict[str, tuple[str, ...]] = {}
         self.every: set[str] = set()
@@ -183,6 +257,7 @@ class _Options:
             for a in literal.args
         ]
         for args in product(*choices):
+            self.deadline.check()
             self.every.update(a for a in args if a not in literal.args)
             changed = Literal(literal.predicate, args, literal.value)
             yield Not(changed) if isinstance(part, Not) else changed
@@ -203,15 +278,16 @@ class _Options:
                 options = tuple(x for x in options if x not in spare)
 
             def fit(x: str, v: str = variable, a: Sequence[Literal] = about) -> tuple[int, object]:
+                self.deadline.check()
                 return -sum(state.holds(y.bind({v: x})) for y in a), by_number(x)
 
             choices.append(options if is_instance(category) else sorted(options, key=fit))
         distinct = [v for v, _ in variables if "." not in v]
         names = [v for v, _ in variables]
-        for values in product(*choices):
+        for values in different(choices, [v in distinct for v in names]):
+            self.deadline.check()
             binding = dict(zip(names, values, strict=True))
-            if len({binding[v] for v in distinct}) == len(distinct):
-                yield tuple(dict.fromkeys(_bound(p, binding) for p in parts))
+            yield tuple(dict.fromkeys(_bound(p, binding) for p in parts))
 
     def _spare(self, made: Sequence[str], wanted: int) -> Iterator[str]:
         """Pieces of one source are alike: so many of each are enough."""

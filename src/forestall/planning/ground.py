@@ -6,10 +6,9 @@ parts of needs alone; then every skill that can run becomes a draft, which `numb
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
-from math import inf
 
+from forestall.deadline import Deadline
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Not, free
 from forestall.domain.model import Domain
@@ -43,25 +42,22 @@ class _SkillPlan:
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
 
 
-class TooLargeError(Exception):
-    """Grounding took longer than it may."""
-
-
-def ground(state: State, universe: Universe, deadline_s: float = inf) -> Grounding:
+def ground(state: State, universe: Universe, deadline: Deadline | None = None) -> Grounding:
     """Ground everything that can happen.
 
     Raises:
-        TooLargeError: it is not done by a time of `time.perf_counter`.
+        TimeUp: the deadline is over before it is done.
     """
-    return _Grounding(state, universe, deadline_s).run()
+    grounding = _Grounding(state, universe, deadline).run()
+    grounding.grounder.deadline = None  # what is asked of it later belongs to others
+    return grounding
 
 
 class _Grounding:
-    def __init__(self, state: State, universe: Universe, deadline_s: float) -> None:
-        self.deadline_s = deadline_s
+    def __init__(self, state: State, universe: Universe, deadline: Deadline | None) -> None:
         self.domain = state.domain
         self.schemas = schemas_of(state.domain)
-        self.grounder = Grounder(state, universe, self.schemas)
+        self.grounder = Grounder(state, universe, self.schemas, deadline)
         self.universe, self.state = universe, state
         self.choices = Choices(self.grounder)
         plans = self.domain.__dict__.get("_skill_plans")
@@ -151,17 +147,13 @@ class _Grounding:
         join = self.schemas.join(skill.parameters, plan.simple, frozenset())
         order = [p.name for p in skill.parameters]
         for found, _ in join(self.grounder, {}):
-            self._in_time()
+            self.grounder.in_time()
             names = {v: found[v] for v in order}
             if skill.makes and not self._makes_known(skill, names):
                 continue
             if skill.family and self._other_fits_better(skill, names):
                 continue
             yield names
-
-    def _in_time(self) -> None:
-        if time.perf_counter() > self.deadline_s:
-            raise TooLargeError
 
     def _makes_known(self, skill: Skill, names: Names) -> bool:
         made = self.universe.made
@@ -202,7 +194,7 @@ class _Grounding:
     # --- drafts ----------------------------------------------------------------------------------
 
     def _drafts(self, plan: _SkillPlan, names: Names) -> Iterator[Draft]:
-        self._in_time()
+        self.grounder.in_time()
         g, skill = self.grounder, plan.skill
         made = self._made(skill, names)
         first = {v: pieces[0] for v, pieces in made.items()}
@@ -364,7 +356,7 @@ class _Grounding:
         join = self.schemas.join(process.parameters, process.condition, frozenset())
         found = []
         for names, node in join(self.grounder, {}):
-            self._in_time()
+            self.grounder.in_time()
             changes = list(self._changes(process.effects, names, {}))
             if changes:
                 found.append(Event(node, changes))

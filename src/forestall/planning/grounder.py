@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from forestall.deadline import Deadline
 from forestall.domain.evaluate import static_holds
 from forestall.domain.formula import TRUE, literals
 from forestall.domain.model import SAME, SAME_CATEGORY, Domain
@@ -21,6 +22,8 @@ from forestall.types.facts import category_of
 
 EXISTS = "exists"
 _FIRST = 2
+_ASKED = 32
+"""After how many questions for things, each of some ten microseconds, the deadline is asked."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +106,20 @@ def _untouched(domain: Domain, name: str) -> bool:
 
 
 class Grounder:
-    """Implements `schemas.World` over a universe and what is possible in it."""
+    """Implements `schemas.World` over a universe and what is possible in it.
 
-    def __init__(self, state: State, universe: Universe, schemas: Schemas) -> None:
+    Every question for things asks the deadline now and then, while there is one.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        universe: Universe,
+        schemas: Schemas,
+        deadline: Deadline | None = None,
+    ) -> None:
         self.state, self.universe, self.schemas = state, universe, schemas
+        self.deadline, self._asked = deadline, 0
         self.domain = state.domain
         made = [n for names in universe.made.values() for n in names]
         self.names: tuple[str, ...] = tuple(dict.fromkeys((*universe.things, *made)))
@@ -128,6 +141,16 @@ class Grounder:
         self.possible: set[Atom] = set()
         self._derived: dict[Atom, Node] = {}
         self._about: dict[str, dict[Atom, None]] = {}
+
+    def in_time(self) -> None:
+        """See now and then that the deadline is not over.
+
+        Raises:
+            TimeUp: it is.
+        """
+        self._asked += 1
+        if not self._asked % _ASKED and self.deadline is not None:
+            self.deadline.check()
 
     # --- what is possible ------------------------------------------------------------------------
 
@@ -176,10 +199,12 @@ class Grounder:
 
     def things(self) -> Sequence[str]:
         """Every thing."""
+        self.in_time()
         return self.names
 
     def of_kind(self, kind: str) -> Sequence[str]:
         """Things that count as a kind."""
+        self.in_time()
         found = self._kinds.get(kind)
         if found is None:
             kinds, categories = self.domain.kinds, self.categories
@@ -219,6 +244,7 @@ class Grounder:
 
     def static_related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
         """What fits at a position of a static predicate."""
+        self.in_time()
         key = (predicate, position, *args[:position], *args[position + 1 :])
         found = self._static_related.get(key)
         if found is None:
@@ -259,6 +285,7 @@ class Grounder:
 
     def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
         """What may stand at a position of a relation."""
+        self.in_time()
         if len(args) == 2:
             return tuple(self._possible.get((predicate, position, args[1 - position]), ()))
         return tuple(

@@ -7,6 +7,7 @@ taken for granted. Called by `search`.
 
 from __future__ import annotations
 
+from forestall.deadline import Deadline
 from forestall.planning.problem import Problem
 
 _Unit = tuple[int, int, int]
@@ -15,9 +16,13 @@ FREE = -1
 
 
 class RelaxedPlan:
-    """Heuristic over one problem; `evaluate` is called for every expanded state."""
+    """Heuristic over one problem; `evaluate` is called for every expanded state.
 
-    def __init__(self, problem: Problem) -> None:
+    It raises TimeUp where the deadline is over.
+    """
+
+    def __init__(self, problem: Problem, deadline: Deadline | None = None) -> None:
+        self.deadline = deadline or Deadline()
         self.goals = problem.goals
         self.operators = problem.operators
         units: list[_Unit] = []
@@ -56,6 +61,7 @@ class RelaxedPlan:
         goals = self.goals
         goal = next((g for g in goals if g & reached == g), None)
         while goal is None:
+            self.deadline.check()
             later, fresh = [], 0
             for unit in waiting:
                 condition, add, index = unit
@@ -78,8 +84,8 @@ class RelaxedPlan:
             goal = next((g for g in goals if g & reached == g), None)
         return self._extract(state | self._granted, goal, supporter)
 
-    @staticmethod
     def _derive(
+        self,
         reached: int,
         rules: list[_Unit],
         counts: list[tuple[int, int, int]],
@@ -87,6 +93,7 @@ class RelaxedPlan:
     ) -> int:
         progress = True
         while progress:
+            self.deadline.check()
             progress = False
             for body, head, _ in rules:
                 if not head & reached and body & reached == body:

@@ -6,9 +6,10 @@ counts become auxiliary facts with rules; derived facts are put into strata.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
+from forestall.deadline import Deadline
 from forestall.domain.formula import And, Formula
 from forestall.domain.schema import PredicateKind
 from forestall.errors import InputError
@@ -26,7 +27,12 @@ class UnsupportedError(Exception):
 
 
 def number(
-    grounding: Grounding, state: State, goals: Sequence[Goal], careful: bool = True
+    grounding: Grounding,
+    state: State,
+    goals: Sequence[Goal],
+    careful: bool = True,
+    barred: Callable[[Draft], bool] | None = None,
+    deadline: Deadline | None = None,
 ) -> Problem:
     """The problem of reaching any one of the goals.
 
@@ -35,9 +41,12 @@ def number(
         state: the first state.
         goals: conjunctions of ground formulas.
         careful: whether skills also ask for what they prefer, where it holds at first.
+        barred: skills that are left out.
+        deadline: when to stop.
 
     Raises:
         UnsupportedError: no goal can be expressed.
+        TimeUp: the deadline is over.
     """
     nodes: list[Node] = []
     refused: UnsupportedError | None = None
@@ -48,7 +57,7 @@ def number(
             refused = error
     if refused is not None and not nodes:
         raise refused
-    return _Numbering(grounding, state, careful).problem(nodes)
+    return _Numbering(grounding, state, careful, barred, deadline or Deadline()).problem(nodes)
 
 
 def _goal_node(grounding: Grounding, state: State, goal: Goal) -> Node:
@@ -69,8 +78,17 @@ def _inside(part: Formula) -> Iterable[Literal]:
 
 
 class _Numbering:
-    def __init__(self, grounding: Grounding, state: State, careful: bool) -> None:
+    def __init__(
+        self,
+        grounding: Grounding,
+        state: State,
+        careful: bool,
+        barred: Callable[[Draft], bool] | None,
+        deadline: Deadline,
+    ) -> None:
+        self.able = [d for d in grounding.drafts if barred is None or not barred(d)]
         self.grounding, self.state, self.careful = grounding, state, careful
+        self.deadline = deadline
         self.grounder = grounding.grounder
         self.definitions = self.grounder.definitions
         self._base_of: dict[int, frozenset[int]] = {}
@@ -99,6 +117,7 @@ class _Numbering:
         for events in processes:
             several = []
             for event in events:
+                self.deadline.check()
                 mask = self._mask(event.condition)
                 effects = self._effects(event.changes)
                 if mask is None or not effects:
@@ -132,7 +151,8 @@ class _Numbering:
     def _relevant(self, goals: list[Node]) -> tuple[list[Draft], list[list[Event]], set[int]]:
         """Facts on which a goal depends, and what changes them."""
         touching: dict[int, list[tuple[Node, tuple[Node, ...]]]] = {}
-        for draft in self.grounding.drafts:
+        for draft in self.able:
+            self.deadline.check()
             for change in draft.changes:
                 needs = (draft.condition, *(draft.prefers if self.careful else ()))
                 for fact in (*change.add, *change.delete):
@@ -149,6 +169,7 @@ class _Numbering:
             fact = waiting.pop()
             if fact in relevant:
                 continue
+            self.deadline.check()
             relevant.add(fact)
             for condition, needs in touching.get(fact, ()):
                 for node in (condition, *needs):
@@ -157,7 +178,7 @@ class _Numbering:
                         waiting += self._bases(node)
         drafts = [
             d
-            for d in self.grounding.drafts
+            for d in self.able
             if any(f in relevant for c in d.changes for f in (*c.add, *c.delete))
         ]
         happening = [
@@ -278,6 +299,7 @@ class _Numbering:
     # --- operators -------------------------------------------------------------------------------
 
     def _operator(self, draft: Draft) -> tuple[Operator, list[int]] | None:
+        self.deadline.check()
         mask = self._mask(draft.condition)
         if mask is None:
             return None

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
+from forestall.deadline import Deadline
 from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Formula
 from forestall.domain.model import Domain
@@ -170,8 +172,12 @@ class Possible(Grounder):
                     yield known
 
 
-def possible(state: State, made: Made) -> Possible:
+@contextmanager
+def possible(state: State, made: Made, deadline: Deadline | None = None) -> Iterator[Possible]:
     """What could be brought about among the things of a state, worked out once for these things.
+
+    While it is used it raises TimeUp where the deadline is over; what was then half worked out is
+    forgotten.
 
     That a relation holds at first is asked anew; what follows from it may be remembered, by which
     too much is thought possible, never too little of what skills do.
@@ -183,8 +189,14 @@ def possible(state: State, made: Made) -> Possible:
         found = recent[key] = Possible(state, made)
         if len(recent) > _RECENT:
             recent.popitem(last=False)
-    found.state = state
-    return found
+    found.state, found.deadline = state, deadline
+    try:
+        yield found
+    except BaseException:
+        recent.pop(key, None)
+        raise
+    finally:
+        found.deadline = None
 
 
 def ways_of(domain: Domain) -> dict[str, list[Way]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from forestall.deadline import Deadline
 from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
 from forestall.domain.formula import (
     And,
@@ -18,18 +19,19 @@ from forestall.domain.formula import (
     Not,
     Or,
     Some,
-    normal,
 )
 from forestall.domain.schema import Copy, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, makeable
 from forestall.planning.grounder import Universe
-from forestall.planning.possible import Names, Way, possible
+from forestall.planning.possible import Names, Possible, Way, possible
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 DEPTH = 9
 GROUPS = 4
 """How many categories of things are tried for one open parameter."""
+SUPPORTS = 2
+"""How many supports are kept for putting things away."""
 
 
 def everything(state: State) -> Universe:
@@ -48,7 +50,11 @@ def everything(state: State) -> Universe:
 
 
 def narrowed(
-    state: State, goals: Sequence[Conjunction], also: Iterable[str] = (), supports: int = 2
+    state: State,
+    goals: Sequence[Conjunction],
+    also: Iterable[str] = (),
+    shunned: frozenset[str] = frozenset(),
+    deadline: Deadline | None = None,
 ) -> Universe:
     """The things that matter for any of the goals.
 
@@ -56,21 +62,26 @@ def narrowed(
         state: the first state.
         goals: ground alternatives.
         also: further things to keep.
-        supports: how many supports to keep for putting things away.
+        shunned: things that are taken last where others will do.
+        deadline: when to stop.
+
+    Raises:
+        TimeUp: it is over.
     """
-    closure = _Closure(state)
-    closure.keep(h for _, h in state.in_hands())
-    closure.keep(x for x in also if x in state.kinds)
-    parts = tuple(dict.fromkeys(p for goal in goals for p in goal))
-    for part in parts:
-        closure.want(part)
-    chosen = _supports(state, closure.kept, closure.cleared)[:supports]
+    made = makeable(state)
+    with possible(state, made, deadline) as world:
+        closure = _Closure(state, world, shunned)
+        closure.keep(h for _, h in state.in_hands())
+        closure.keep(x for x in also if x in state.kinds)
+        for part in dict.fromkeys(p for goal in goals for p in goal):
+            closure.want(part)
+    chosen = _supports(state, closure.kept, closure.cleared, shunned)[:SUPPORTS]
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
     return Universe(things, closure.made, frozenset(closure.purposeful), tuple(chosen))
 
 
-def _supports(state: State, kept: set[str], avoid: set[str]) -> list[str]:
+def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[str]) -> list[str]:
     """Supports in order of preference: room first, not where something is to be cleared."""
     domain = state.domain
     roots = {state.root(x) for x in avoid}
@@ -80,7 +91,13 @@ def _supports(state: State, kept: set[str], avoid: set[str]) -> list[str]:
         kinds = domain.kinds(category)
         ranks = [i for i, tag in enumerate(order) if tag in kinds]
         if ranks and not kinds & set(domain.roles.avoid):
-            key = (name in state.crowded, name in roots, ranks[0], name not in kept)
+            key = (
+                name in shunned,
+                name in state.crowded,
+                name in roots,
+                ranks[0],
+                name not in kept,
+            )
             found.append((key, by_number(name), name))
     return [name for _, _, name in sorted(found)]
 
@@ -88,11 +105,10 @@ def _supports(state: State, kept: set[str], avoid: set[str]) -> list[str]:
 class _Closure:
     """Collects what is needed, until nothing more is."""
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, world: Possible, shunned: frozenset[str]) -> None:
+        self.shunned = shunned
         self.state, self.domain = state, state.domain
-        self.all_made = makeable(state)
-        self.world = possible(state, self.all_made)
-        self.schemas = self.world.schemas
+        self.world, self.schemas = world, world.schemas
         self.kept: set[str] = set()
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self.purposeful: set[str] = set()
@@ -159,12 +175,13 @@ class _Closure:
 
     def need(self, formula: Formula, names: Names, depth: int, always: bool = False) -> None:
         """Keep what can make a formula true."""
+        self.world.in_time()
         if depth > DEPTH or not self.schemas.free(formula) <= names.keys():
             return
         if always or not self.state.true(formula, names):
             self._need(self.schemas.normal(formula), names, depth)
         else:
-            self._rely(normal(formula), names)
+            self._rely(self.schemas.normal(formula), names)
 
     def _rely(self, formula: Formula, names: Names) -> None:
         """Keep by what a formula is true: without its witnesses a narrowed problem denies it."""
@@ -177,7 +194,7 @@ class _Closure:
             self.visited.add(key)
             if known is not None and known.definition is not None and formula.value == "true":
                 inner = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
-                self._rely(normal(known.definition), inner)
+                self._rely(self.schemas.normal(known.definition), inner)
         elif isinstance(formula, And | Or):
             for part in formula.parts:
                 if evaluate(part, self.state, names) == TRUE:
@@ -243,7 +260,7 @@ class _Closure:
 
     def _ease(self, name: str) -> tuple[object, ...]:
         rest = self.state.follow(("ease", name), lambda: self._judged(name))
-        return (rest[0], name not in self.kept, *rest[1:])
+        return (name in self.shunned, rest[0], name not in self.kept, *rest[1:])
 
     def _judged(self, name: str) -> tuple[object, ...]:
         state, roles = self.state, self.domain.roles

@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass
 from enum import Enum
 
+from forestall.deadline import Deadline, TimeUp
 from forestall.planning.heuristic import RelaxedPlan
 from forestall.planning.problem import Problem
 
@@ -22,11 +23,12 @@ BOOST = 4
 
 @dataclass(frozen=True, slots=True)
 class SearchConfig:
-    """Bounds of one search.
+    """Bounds of planning.
 
     Args:
-        time_limit_s: wall-clock limit.
-        max_expansions: limit on expanded states.
+        time_limit_s: wall-clock limit of everything that one call does: what matters, grounding,
+            every search and the shortening of what they find.
+        max_expansions: limit on the expanded states of each search.
         whole_limit_s: time for a problem with everything in it, where the narrowed one failed.
     """
 
@@ -54,20 +56,26 @@ class SearchResult:
     seconds: float = 0.0
 
 
-def solve(problem: Problem, config: SearchConfig | None = None) -> SearchResult:
-    """Find a plan to any one of the problem's goals, or prove that there is none."""
+def solve(
+    problem: Problem, config: SearchConfig | None = None, deadline: Deadline | None = None
+) -> SearchResult:
+    """Find a plan to any one of the problem's goals, or prove that there is none.
+
+    A plan that is found shortly before the deadline is not shortened any more.
+    """
     config = config or SearchConfig()
     start_s = time.perf_counter()
-    outcome, steps, expanded = _search(problem, config, start_s + config.time_limit_s)
+    deadline = (deadline or Deadline()).within(config.time_limit_s)
+    outcome, steps, expanded = _search(problem, config, deadline)
     if outcome is SearchOutcome.SOLVED:
-        steps = _shortened(problem, steps)
+        steps = _shortened(problem, steps, deadline)
     return SearchResult(outcome, tuple(steps), expanded, time.perf_counter() - start_s)
 
 
 def _search(
-    problem: Problem, config: SearchConfig, deadline_s: float
+    problem: Problem, config: SearchConfig, deadline: Deadline
 ) -> tuple[SearchOutcome, list[int], int]:
-    heuristic = RelaxedPlan(problem)
+    heuristic = RelaxedPlan(problem, deadline)
     operators = problem.operators
     parents: dict[int, tuple[int, int, int]] = {}  # state → (state before, operator, depth)
     everyone: list[tuple[int, int, int, int, int]] = []
@@ -85,7 +93,10 @@ def _search(
             full = problem.close(state)
             if any(g & full == g for g in problem.goals):
                 return SearchOutcome.SOLVED, _path(parents, state), expanded
-            h, helpful = heuristic.evaluate(full)
+            try:
+                h, helpful = heuristic.evaluate(full)
+            except TimeUp:
+                return SearchOutcome.TIMEOUT, [], expanded
             if h is not None:
                 expanded += 1
                 if best is None or h < best:
@@ -98,7 +109,7 @@ def _search(
                         heapq.heappush(everyone, item)
                         if index in liked:
                             heapq.heappush(helpful_only, item)
-        over = _over(config, deadline_s, expanded)
+        over = _over(config, deadline, expanded)
         if over is not None:
             return over, [], expanded
         if helpful_only and (credit > 0 or not everyone or order % (BOOST + 1)):
@@ -111,10 +122,10 @@ def _search(
         entry = (before, via, 0, depth + 1)
 
 
-def _over(config: SearchConfig, deadline_s: float, expanded: int) -> SearchOutcome | None:
+def _over(config: SearchConfig, deadline: Deadline, expanded: int) -> SearchOutcome | None:
     if expanded >= config.max_expansions:
         return SearchOutcome.CUT_SHORT
-    return SearchOutcome.TIMEOUT if time.perf_counter() > deadline_s else None
+    return SearchOutcome.TIMEOUT if deadline.over else None
 
 
 def _path(parents: dict[int, tuple[int, int, int]], state: int) -> list[int]:
@@ -127,20 +138,20 @@ def _path(parents: dict[int, tuple[int, int, int]], state: int) -> list[int]:
         state = before
 
 
-def _shortened(problem: Problem, steps: list[int]) -> list[int]:
+def _shortened(problem: Problem, steps: list[int], deadline: Deadline) -> list[int]:
     """Drop every step that, with what then cannot run either, the goal does without."""
-    position = 0
-    while position < len(steps):
-        state = problem.initial
+    position, before = 0, problem.initial  # the state before the step at `position`
+    while position < len(steps) and not deadline.over:
+        state = before
         kept = []
-        for i, index in enumerate(steps):
+        for index in steps[position + 1 :]:
             operator = problem.operators[index]
-            if i == position or operator.condition & ~problem.close(state):
-                continue
-            kept.append(index)
-            state = problem.apply(state, operator)
+            if not operator.condition & ~problem.close(state):
+                kept.append(index)
+                state = problem.apply(state, operator)
         if problem.reached(state):
-            steps = kept
+            steps = steps[:position] + kept
         else:
+            before = problem.apply(before, problem.operators[steps[position]])
             position += 1
     return steps

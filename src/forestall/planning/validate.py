@@ -6,12 +6,13 @@ and why, and then the goal facts that the plan leaves unmet.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from itertools import islice, product
+from itertools import islice
 
 from forestall.domain.model import LOCATED, Domain
 from forestall.planning.execute import Refusal, perform
+from forestall.planning.goals import different
 from forestall.planning.settle import settle
 from forestall.planning.state import State, decided
 from forestall.types.facts import Literal, category_of
@@ -104,29 +105,75 @@ def run(state: State, subtasks: Iterable[Subtask]) -> Trace:
 def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
     """Goal literals that fail under the best binding of the goal's variables; () if it is met.
 
-    A literal of `never` that held at any time is returned as it stands, bound.
+    A literal of `never` that held at any time is returned as it stands, bound. Where there are
+    more bindings than are gone through, a goal may be called unmet that is met, and never the
+    other way round.
     """
     final = states[-1]
+    known: dict[Literal, bool] = {}
+    once: dict[Literal, bool] = {}
+
+    def fails(literal: Literal) -> bool:
+        if literal not in known:
+            known[literal] = not final.holds(literal)
+        return known[literal]
+
+    def happened(literal: Literal) -> bool:
+        if literal not in once:
+            once[literal] = any(s.holds(literal) for s in states)
+        return once[literal]
+
     best: tuple[Literal, ...] | None = None
-    for binding in bindings(final, goal):
-        missing = tuple(g for x in goal.literals if not final.holds(g := x.bind(binding)))
-        never = tuple(g for x in goal.never if any(s.holds(g := x.bind(binding)) for s in states))
+    for binding in bindings(final, goal, fails, happened):
+        missing = tuple(g for x in goal.literals if fails(g := x.bind(binding)))
+        never = tuple(g for x in goal.never if happened(g := x.bind(binding)))
         if not missing and not never:
             return ()
         if best is None or len(missing) + len(never) < len(best):
             best = missing + never
     if best is not None:
         return best
-    return tuple(Literal(LOCATED, (c,)) for _, c in goal.variables if not final.matches(c))
+    lacking = dict.fromkeys(c for _, c in goal.variables if not final.matches(c))
+    lacking = lacking or dict.fromkeys(c for _, c in goal.variables)  # fewer than are asked for
+    return tuple(Literal(LOCATED, (c,)) for c in lacking)
 
 
-def bindings(state: State, goal: Goal) -> Iterator[dict[str, str]]:
-    """Every binding of the goal's variables to different things (bounded), in a fixed order."""
+def bindings(
+    state: State,
+    goal: Goal,
+    fails: Callable[[Literal], bool],
+    happened: Callable[[Literal], bool],
+) -> Iterator[dict[str, str]]:
+    """Bindings of the goal's variables to different things (bounded).
+
+    First those of which no variable alone makes anything fail, then all, in a fixed order.
+
+    Args:
+        state: says which things there are.
+        goal: with variables.
+        fails: whether a ground literal of the goal does not hold.
+        happened: whether a ground literal that may never hold has held.
+    """
     names = [v for v, _ in goal.variables]
-    choices = [state.matches(c) for _, c in goal.variables]
-    for values in islice(product(*choices), MAX_BINDINGS):
-        if len(set(values)) == len(values):
+    every = [state.matches(c) for _, c in goal.variables]
+    faultless: list[list[str]] = []
+    for variable, things in zip(names, every, strict=True):
+        alone = [x for x in goal.literals if _only(x, variable)]
+        never = [x for x in goal.never if _only(x, variable)]
+        faultless.append([])
+        for thing in things:
+            bound = {variable: thing}
+            if not any(fails(x.bind(bound)) for x in alone):
+                if not any(happened(x.bind(bound)) for x in never):
+                    faultless[-1].append(thing)
+    for choices in (faultless, every):
+        for values in islice(different(choices, [True] * len(names)), MAX_BINDINGS):
             yield dict(zip(names, values, strict=True))
+
+
+def _only(literal: Literal, variable: str) -> bool:
+    """Whether a literal speaks of this variable and of no other."""
+    return {a for a in literal.args if a.startswith("?")} == {variable}
 
 
 def as_checked(plan: Plan, check: PlanCheck, state: State) -> Plan:

@@ -119,7 +119,7 @@ class PlannerReplanner:
             if planned.outcome is ReplanOutcome.SOLVED:
                 solved = True
                 yield planned
-        if len(wanted) > 1:
+        if len(wanted) > 1 and not solved:
             possible = [x for x in wanted if self._can(state, x)]
             if possible and len(possible) < len(wanted):
                 yield from self._repairs(attempts, state, context, possible, must_stay)
