@@ -101,9 +101,12 @@ class Asked:
         circle = Circle(lambda k, those: TRUE if self._defined(k, those) is True else FALSE)
         self._circles[members] = circle
         try:
-            return circle.settle(known, args) == TRUE
+            truth = circle.settle(known, args)
         finally:
             del self._circles[members]
+        for fact, found in circle.now.items():
+            self.state.follow(fact, lambda found=found: found == TRUE)
+        return truth == TRUE
 
     def _defined(self, known: Predicate, args: tuple[str, ...]) -> Node:
         assert known.definition is not None

@@ -42,19 +42,30 @@ class _SkillPlan:
         self.denied_done = None if skill.done_when is None else Not(skill.done_when)
 
 
-def ground(state: State, universe: Universe, deadline: Deadline | None = None) -> Grounding:
-    """Ground everything that can happen.
+def ground(
+    state: State,
+    universe: Universe,
+    skills: frozenset[str] | None = None,
+    deadline: Deadline | None = None,
+) -> Grounding:
+    """Ground everything that can happen, by some skills or by all that the robot has.
 
     Raises:
         TimeUp: the deadline is over before it is done.
     """
-    grounding = _Grounding(state, universe, deadline).run()
+    grounding = _Grounding(state, universe, skills, deadline).run()
     grounding.grounder.deadline = None  # what is asked of it later belongs to others
     return grounding
 
 
 class _Grounding:
-    def __init__(self, state: State, universe: Universe, deadline: Deadline | None) -> None:
+    def __init__(
+        self,
+        state: State,
+        universe: Universe,
+        skills: frozenset[str] | None,
+        deadline: Deadline | None,
+    ) -> None:
         self.domain = state.domain
         self.schemas = schemas_of(state.domain)
         self.grounder = Grounder(state, universe, self.schemas, deadline)
@@ -69,7 +80,9 @@ class _Grounding:
                 if not self.domain.skills[s].drives
             ]
             self.domain.__dict__["_skill_plans"] = plans
-        self.plans: list[_SkillPlan] = plans
+        self.plans: list[_SkillPlan] = [
+            p for p in plans if skills is None or p.skill.name in skills
+        ]
         self._seen: set[tuple[str, ...]] = set()
 
     def run(self) -> Grounding:

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import static_holds
+from forestall.domain.evaluate import DEEP, DeeperError, static_holds
 from forestall.domain.formula import TRUE, literals
 from forestall.domain.model import SAME, SAME_CATEGORY, Domain
-from forestall.domain.schema import PredicateKind
+from forestall.domain.schema import Predicate, PredicateKind
 from forestall.planning.nodes import Junction, Node, all_of, assuming
 from forestall.planning.problem import Atom
 from forestall.planning.schemas import Schemas
@@ -140,6 +140,7 @@ class Grounder:
         self._possible: dict[tuple[str, int, str], dict[str, None]] = {}
         self.possible: set[Atom] = set()
         self._derived: dict[Atom, Node] = {}
+        self._depth = 0
         self._about: dict[str, dict[Atom, None]] = {}
 
     def in_time(self) -> None:
@@ -306,11 +307,36 @@ class Grounder:
         if predicate in self.rigid:
             return self.state.says(predicate, *args)
         known = self.domain.predicates[predicate]
+        if self._depth == DEEP:
+            raise DeeperError(known, args)
+        if self._depth:
+            try:
+                return self._defined(known, args)
+            except DeeperError:
+                del self._derived[atom]
+                raise
+        waiting = [(known, args)]  # what lies too deep first, as in `evaluate.Circle`
+        while True:
+            try:
+                node = self._defined(*waiting[-1])
+            except DeeperError as deeper:
+                waiting.append((deeper.known, deeper.those))
+                continue
+            waiting.pop()
+            if not waiting:
+                return node
+
+    def _defined(self, known: Predicate, args: tuple[str, ...]) -> Node:
         assert known.definition is not None
+        atom = (known.name, *args)
         number = self._derived[atom] = self.number_of(atom)
         self.definitions.pop(number, None)
         names = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
-        node = self.schemas.formula(known.definition)(self, names)
+        self._depth += 1
+        try:
+            node = self.schemas.formula(known.definition)(self, names)
+        finally:
+            self._depth -= 1
         if isinstance(node, Junction):
             self.definitions[number] = node
             return number

@@ -62,12 +62,13 @@ class RelaxedPlan:
         goal = next((g for g in goals if g & reached == g), None)
         while goal is None:
             self.deadline.check()
-            later, fresh = [], 0
+            later: list[_Unit] = []
+            fresh, lacking, wait = 0, ~reached, later.append
             for unit in waiting:
-                condition, add, index = unit
-                if condition & reached != condition:
-                    later.append(unit)
+                if unit[0] & lacking:
+                    wait(unit)
                     continue
+                condition, add, index = unit
                 new = add & ~(reached | fresh)
                 if new:
                     fresh |= new

@@ -1,15 +1,15 @@
 """Which parts of a skill's needs tell something before anything is grounded.
 
-Called by `ground`, `choices` and `possible`; calls nothing but the formulas.
+Called by `ground`, `choices`, `possible` and `planner`; calls nothing but the formulas.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from forestall.domain.formula import And, Formula, Not, Some, free, literals, normal
 from forestall.domain.model import FACING, Domain
-from forestall.domain.schema import Effect, PredicateKind, Skill
+from forestall.domain.schema import Effect, PredicateKind, Process, Skill
 from forestall.types.facts import Literal
 
 
@@ -74,3 +74,58 @@ def asks_relation(domain: Domain, formula: Formula) -> bool:
 def asks(formulas: Iterable[Formula], predicate: str) -> bool:
     """Whether formulas speak of a predicate."""
     return any(x.predicate == predicate for f in formulas for x, _ in literals(f))
+
+
+def useful(domain: Domain, goal: Iterable[Formula]) -> frozenset[str]:
+    """Skills on which a goal can depend at all, by the predicates that they change and ask for."""
+    relevant: set[str] = set()
+    waiting = [p for f in goal for p in _predicates(domain, f)]
+    schemas: list[Skill | Process] = [*domain.skills.values(), *domain.processes]
+    found: list[Skill | Process] = []
+    while True:
+        while waiting:
+            name = waiting.pop()
+            if name not in relevant:
+                relevant.add(name)
+                known = domain.predicates.get(name)
+                if known is not None and known.definition is not None:
+                    waiting += _predicates(domain, known.definition)
+        for schema in schemas:
+            if schema not in found and _changed(domain, schema) & relevant:
+                found.append(schema)
+                waiting += [p for f in _asked(schema) for p in _predicates(domain, f)]
+        if not waiting:
+            return frozenset(s.name for s in found if isinstance(s, Skill))
+
+
+def _predicates(domain: Domain, formula: Formula) -> list[str]:
+    return [x.predicate for x, _ in literals(formula) if x.predicate in domain.predicates]
+
+
+def _changed(domain: Domain, schema: Skill | Process) -> set[str]:
+    """Predicates that can change: those named, others of their groups, all where things come or go.
+
+    What makes a thing or takes one away changes whatever can be said of it.
+    """
+    if any(e.gone for e in schema.effects) or (isinstance(schema, Skill) and schema.makes):
+        return set(domain.predicates)
+    named = {f.predicate for e in schema.effects for f in e.facts}
+    named |= {c.attribute for e in schema.effects for c in e.copies}
+    groups = {domain.predicates[n].group for n in named} - {None}
+    return named | {p.name for p in domain.predicates.values() if p.group in groups}
+
+
+def _asked(schema: Skill | Process) -> Iterator[Formula]:
+    """Everything that is asked before a schema changes something."""
+    for effect in schema.effects:
+        yield effect.condition
+        yield from (Literal(c.attribute, (c.source,), "") for c in effect.copies)
+    if isinstance(schema, Process):
+        yield schema.condition
+        return
+    yield from (n.formula for n in schema.needs)
+    yield from schema.prefers
+    if schema.done_when is not None:
+        yield schema.done_when
+    for choice in schema.choices:
+        yield from (*choice.among, choice.such_that, choice.only_if)

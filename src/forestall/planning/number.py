@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from forestall.deadline import Deadline
+from forestall.domain.evaluate import DEEP
 from forestall.domain.formula import And, Formula
 from forestall.domain.schema import PredicateKind
 from forestall.errors import InputError
@@ -110,6 +111,8 @@ class _Numbering:
         self.heads: dict[object, int] = {}
         self.complements: dict[int, int] = {}
         self.negated = 0
+        self.depth = 0
+        self.later: list[tuple[int, Node]] = []
         targets = [m for n in goals if (m := self._mask(n)) is not None]
         prepared = [p for d in drafts if (p := self._operator(d)) is not None]
         happenings = []
@@ -127,6 +130,8 @@ class _Numbering:
                     triggers |= self._base_mask(node)
             if several:
                 happenings.append(tuple(several))
+        while self.later:
+            self._defining(*self.later.pop())
         initial = self._initial()
         strata, depends = self._strata()
         problem = Problem(
@@ -271,15 +276,24 @@ class _Numbering:
         found = self.heads.get(fact)
         if found is None:
             found = self.heads[fact] = self._new(self.grounder.atoms[fact])
-            self._define(found, self.definitions[fact])
+            self._defining(found, self.definitions[fact])
         return found
 
     def _auxiliary(self, node: Junction) -> int:
         found = self.heads.get(node)
         if found is None:
             found = self.heads[node] = self._new(("aux", str(len(self.heads))))
-            self._define(found, node)
+            self._defining(found, node)
         return found
+
+    def _defining(self, head: int, node: Node) -> None:
+        """Define a fact now, or later where it lies deep within the definitions of others."""
+        if self.depth == DEEP:
+            self.later.append((head, node))
+            return
+        self.depth += 1
+        self._define(head, node)
+        self.depth -= 1
 
     def _define(self, head: int, node: Node) -> None:
         if node is False:

@@ -26,6 +26,7 @@ from forestall.planning.goals import (
 )
 from forestall.planning.ground import ground
 from forestall.planning.grounder import Universe
+from forestall.planning.needs import useful
 from forestall.planning.number import UnsupportedError, number
 from forestall.planning.problem import Operator, Problem
 from forestall.planning.refused import barred_by, is_refused
@@ -52,6 +53,8 @@ MANY = 16
 """From so many things in a goal on, its most promising alternatives are tried alone at first."""
 FEW = 4
 """So many of them."""
+LARGE = 40
+"""Among more things than this only those skills are grounded that the goal can depend on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +202,7 @@ class _Planning:
     ) -> Planned:
         finding = deadline.within(SEARCHING * deadline.left())
         try:
-            grounding = _grounding(self.state, kept, finding)
+            grounding = _grounding(self.state, kept, self._useful(goals, kept), finding)
             barred = barred_by(self.state, self.refused)
             problem = number(grounding, self.state, goals.conjunctions, careful, barred, finding)
         except UnsupportedError as error:
@@ -219,6 +222,12 @@ class _Planning:
             outcome = ReplanOutcome.UNSOLVABLE
         note = _why_not(self.state, goals.conjunctions, self.refused)
         return Planned(outcome, expanded=expanded, note=note)
+
+    def _useful(self, goals: Alternatives, kept: Universe) -> frozenset[str] | None:
+        """The skills to ground: of a small problem all, since other goals then share it."""
+        if len(kept.things) <= LARGE:
+            return None
+        return useful(self.state.domain, (p for c in goals.conjunctions for p in c))
 
     def _driven(self, problem: Problem, steps: list[Operator], loose: frozenset[str]) -> Planned:
         """A plan that was found, with driving; made shorter as long as there is time."""
@@ -271,7 +280,12 @@ def pose(
     return number(_grounding(state, kept), state, goals.conjunctions, not whole)
 
 
-def _grounding(state: State, kept: Universe, deadline: Deadline | None = None) -> Grounding:
+def _grounding(
+    state: State,
+    kept: Universe,
+    skills: frozenset[str] | None = None,
+    deadline: Deadline | None = None,
+) -> Grounding:
     """What can happen among the kept things; the several searches of one replanning share it."""
     known = frozenset(kept.things)
     hands = state.domain.robot.hands
@@ -284,11 +298,12 @@ def _grounding(state: State, kept: Universe, deadline: Deadline | None = None) -
         tuple(sorted(kept.made.items())),
         kept.purposeful,
         kept.supports,
+        skills,
     )
     recent = state.domain.__dict__.setdefault("_groundings", OrderedDict())
     found = recent.get(key)
     if found is None:
-        found = recent[key] = ground(state, kept, deadline)
+        found = recent[key] = ground(state, kept, skills, deadline)
         if len(recent) > _RECENT:
             recent.popitem(last=False)
     return found  # type: ignore[no-any-return]

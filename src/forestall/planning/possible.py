@@ -10,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
 from forestall.deadline import Deadline
 from forestall.domain.evaluate import by_number
@@ -25,7 +26,11 @@ from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 Names = dict[str, str]
+K = TypeVar("K")
+T = TypeVar("T")
 _RECENT = 8
+STEPS = 16
+"""How many facts back it is asked what could bring them about; what lies further is possible."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,7 @@ class Possible(Grounder):
             for (source, skill, variable), names in made.items()
             for n in names
         }
+        self._steps = 0
         self._can: dict[tuple[str, ...], bool] = {}
         self._bindings: dict[tuple[int, tuple[str, ...]], tuple[Names, ...]] = {}
         self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
@@ -63,10 +69,13 @@ class Possible(Grounder):
             return self.number_of(atom)
         found = self._can.get(atom)
         if found is None:
+            if self._steps == STEPS:
+                return self.number_of(atom)
             self._can[atom] = False
-            found = self._can[atom] = any(
-                True for way in self.ways.get(predicate, ()) for _ in self.bindings(way, atom)
-            )
+            with self._step_back(self._can, atom):
+                found = self._can[atom] = any(
+                    True for way in self.ways.get(predicate, ()) for _ in self.bindings(way, atom)
+                )
         return self.number_of(atom) if found else False
 
     def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
@@ -74,19 +83,34 @@ class Possible(Grounder):
         key = (predicate, position, *args[:position], *args[position + 1 :])
         found = self._options.get(key)
         if found is None:
+            if self._steps == STEPS:
+                return self.names
             self._options[key] = ()
             names: dict[str, None] = {}
             atom = (predicate, *(a if i != position else "?" for i, a in enumerate(args)))
-            for way in self.ways.get(predicate, ()):
-                assert isinstance(way.what, Literal)
-                open_name = way.what.args[position]
-                for bound in self.bindings(way, atom):
-                    name = bound.get(open_name)
-                    if name is not None:
-                        names[name] = None
+            with self._step_back(self._options, key):
+                for way in self.ways.get(predicate, ()):
+                    assert isinstance(way.what, Literal)
+                    open_name = way.what.args[position]
+                    for bound in self.bindings(way, atom):
+                        name = bound.get(open_name)
+                        if name is not None:
+                            names[name] = None
             found = self._options[key] = tuple(names)
         now = [x for x in self.state.related(predicate, position, args) if x not in found]
         return (*now, *found)
+
+    @contextmanager
+    def _step_back(self, known: dict[K, T], key: K) -> Iterator[None]:
+        """One fact further back; what is not worked out to its end is not remembered."""
+        self._steps += 1
+        try:
+            yield
+        except BaseException:
+            del known[key]
+            raise
+        finally:
+            self._steps -= 1
 
     def known_bindings(self, way: Way, atom: tuple[str, ...]) -> Sequence[Names]:
         """The bindings of `bindings`, worked out once."""

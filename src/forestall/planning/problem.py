@@ -7,6 +7,7 @@ the base facts; `close` adds the complements and the derived facts that conditio
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 from forestall.types.plan import Subtask
@@ -101,6 +102,13 @@ class Problem:
         self.negated, self.triggers, self.base, self.bounded = negated, triggers, base, bounded
         self._depends = depends
         self._derived: dict[int, int] = {}
+
+    def posed(self, initial: int, goals: tuple[int, ...], operators: Sequence[int]) -> Problem:
+        """The same problem from another state, for other goals, with some of its operators."""
+        other = copy(self)
+        other.initial, other.goals = initial, goals
+        other.operators = tuple(self.operators[i] for i in operators)
+        return other
 
     def close(self, state: int) -> int:
         """The state with complements and derived facts."""

@@ -7,10 +7,10 @@ Where the narrowed problem has no plan the planner takes `everything`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
+from forestall.domain.evaluate import by_number
 from forestall.domain.formula import (
     And,
     Every,
@@ -118,16 +118,18 @@ class _Closure:
     def keep(self, names: Iterable[str]) -> None:
         """Keep things, with what has them, what blocks them, and what fills a limited place."""
         state, roles = self.state, self.domain.roles
-        for name in names:
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop()
             if name in self.kept or name not in state.kinds:
                 continue
             self.kept.add(name)
-            self.keep(p.parent for p in state.chain(name))
+            waiting += [p.parent for p in state.chain(name)]
             if roles.blocking is not None:
-                self.keep(state.related(roles.blocking, 0, ("?", name)))
+                waiting += state.related(roles.blocking, 0, ("?", name))
             category = state.kind(name)
             if category.numbers or roles.movable in category.tags:
-                self.keep(state.contents(name))
+                waiting += state.contents(name)
 
     def use(self, name: str) -> None:
         """Keep a thing that may be put anywhere it fits."""
@@ -185,6 +187,13 @@ class _Closure:
 
     def _rely(self, formula: Formula, names: Names) -> None:
         """Keep by what a formula is true: without its witnesses a narrowed problem denies it."""
+        waiting = [(formula, names)]
+        while waiting:
+            one, known = waiting.pop()
+            waiting += reversed(list(self._reasons(one, known)))
+
+    def _reasons(self, formula: Formula, names: Names) -> Iterator[tuple[Formula, Names]]:
+        """By what, one step further, a formula is true."""
         if isinstance(formula, Literal):
             known = self.domain.predicates.get(formula.predicate)
             args = formula.bind(names).args
@@ -194,18 +203,14 @@ class _Closure:
             self.visited.add(key)
             if known is not None and known.definition is not None and formula.value == "true":
                 inner = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
-                self._rely(self.schemas.normal(known.definition), inner)
+                yield self.schemas.normal(known.definition), inner
         elif isinstance(formula, And | Or):
-            for part in formula.parts:
-                if evaluate(part, self.state, names) == TRUE:
-                    self._rely(part, names)
+            yield from ((p, names) for p in formula.parts if self.state.true(p, names))
         elif isinstance(formula, Some):
-            new = {v.name for v in formula.variables}
-            for bound, truth in solutions(formula.variables, formula.part, self.state, names):
-                if truth == TRUE:
-                    self.keep(bound[v] for v in sorted(new))
-                    self._rely(formula.part, bound)
-                    return
+            bound = next(self.state.bindings(formula.variables, formula.part, names), None)
+            if bound is not None:
+                self.keep(bound[v] for v in sorted(v.name for v in formula.variables))
+                yield formula.part, bound
 
     def _need(self, formula: Formula, names: Names, depth: int) -> None:
         if isinstance(formula, Literal):

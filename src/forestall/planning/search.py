@@ -19,6 +19,8 @@ from forestall.planning.problem import Problem
 
 BOOST = 4
 """How much more often the queue of helpful successors is served."""
+PATIENCE = 60_000
+"""Of so many operators it is asked before a goal is tried thing by thing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,34 +63,84 @@ def solve(
 ) -> SearchResult:
     """Find a plan to any one of the problem's goals, or prove that there is none.
 
-    A plan that is found shortly before the deadline is not shortened any more.
+    What the first states do not lead to is tried thing by thing, and then with all patience. A plan
+    that is found shortly before the deadline is not shortened any more.
     """
     config = config or SearchConfig()
     start_s = time.perf_counter()
     deadline = (deadline or Deadline()).within(config.time_limit_s)
-    outcome, steps, expanded = _search(problem, config, deadline)
+    patience = PATIENCE // (1 + len(problem.operators)) + 200
+    limit = min(config.max_expansions, patience)
+    outcome, steps, expanded = _search(problem, limit, deadline)
+    if outcome is SearchOutcome.CUT_SHORT and limit < config.max_expansions:
+        found, more = _piecewise(problem, patience, config.max_expansions - expanded, deadline)
+        outcome, steps, expanded = SearchOutcome.SOLVED, found or [], expanded + more
+        if found is None:
+            left = config.max_expansions - expanded
+            outcome, steps, more = _search(problem, left, deadline)
+            expanded += more
     if outcome is SearchOutcome.SOLVED:
         steps = _shortened(problem, steps, deadline)
     return SearchResult(outcome, tuple(steps), expanded, time.perf_counter() - start_s)
 
 
+def _piecewise(
+    problem: Problem, patience: int, limit: int, deadline: Deadline
+) -> tuple[list[int] | None, int]:
+    """A goal for one thing after the other: no plan where that leads nowhere.
+
+    What is reached is not touched again, or, where that does not do, only holds again afterwards.
+    The goal is the one of which the fewest facts lack, the first of several.
+    """
+    full = problem.close(problem.initial)
+    goal = min(problem.goals, key=lambda g: (g & ~full).bit_count())
+    steps: list[int] = []
+    state, expanded = problem.initial, 0
+    while (full := problem.close(state)) & goal != goal:
+        kept = goal & full
+        nearer = tuple(kept | part for part in _parts(problem, goal) if part & ~full)
+        every = range(len(problem.operators))
+        harmless = [
+            i for i in every if not any(e.delete & kept for e in problem.operators[i].effects)
+        ]
+        for allowed in (harmless, every):
+            piece = problem.posed(state, nearer, allowed)
+            outcome, found, more = _search(piece, min(limit - expanded, patience), deadline)
+            expanded += more
+            if outcome is SearchOutcome.SOLVED:
+                break
+        else:
+            return None, expanded
+        for index in found:
+            steps.append(allowed[index])
+            state = problem.apply(state, problem.operators[allowed[index]])
+    return steps, expanded
+
+
+def _parts(problem: Problem, goal: int) -> list[int]:
+    """The facts of a goal by the thing that they are about."""
+    parts: dict[str, int] = {}
+    while goal:
+        bit = goal & -goal
+        goal ^= bit
+        atom = problem.atoms[bit.bit_length() - 1]
+        about = atom[1:3] if atom[0] == "not" else atom[:2]
+        parts[about[-1]] = parts.get(about[-1], 0) | bit
+    return list(parts.values())
+
+
 def _search(
-    problem: Problem, config: SearchConfig, deadline: Deadline
+    problem: Problem, limit: int, deadline: Deadline
 ) -> tuple[SearchOutcome, list[int], int]:
     heuristic = RelaxedPlan(problem, deadline)
-    operators = problem.operators
+    queues, conditions = _Queues(), [o.condition for o in problem.operators]
     parents: dict[int, tuple[int, int, int]] = {}  # state → (state before, operator, depth)
-    everyone: list[tuple[int, int, int, int, int]] = []
-    helpful_only: list[tuple[int, int, int, int, int]] = []
-    seen: set[int] = set()
-    expanded = order = credit = 0
+    expanded = 0
     best: int | None = None
-    entry = (problem.initial, -1, -1, 0)
+    before, via, depth = problem.initial, -1, 0
     while True:
-        before, via, _, depth = entry
-        state = before if via < 0 else problem.apply(before, operators[via])
-        if state not in seen:
-            seen.add(state)
+        state = before if via < 0 else problem.apply(before, problem.operators[via])
+        if state not in parents:
             parents[state] = (before, via, depth)
             full = problem.close(state)
             if any(g & full == g for g in problem.goals):
@@ -100,32 +152,48 @@ def _search(
             if h is not None:
                 expanded += 1
                 if best is None or h < best:
-                    best, credit = h, credit + BOOST * 50
-                liked = set(helpful)
-                for index, operator in enumerate(operators):
-                    if operator.condition & full == operator.condition:
-                        order += 1
-                        item = (h, depth, order, state, index)
-                        heapq.heappush(everyone, item)
-                        if index in liked:
-                            heapq.heappush(helpful_only, item)
-        over = _over(config, deadline, expanded)
-        if over is not None:
-            return over, [], expanded
-        if helpful_only and (credit > 0 or not everyone or order % (BOOST + 1)):
-            credit -= 1
-            _, depth, _, before, via = heapq.heappop(helpful_only)
-        elif everyone:
-            _, depth, _, before, via = heapq.heappop(everyone)
-        else:
+                    best = h
+                    queues.credit += BOOST * 50
+                lacking = ~full
+                ready = [i for i, c in enumerate(conditions) if not c & lacking]
+                queues.add(h, depth, state, ready, set(helpful))
+        if expanded >= limit:
+            return SearchOutcome.CUT_SHORT, [], expanded
+        if deadline.over:
+            return SearchOutcome.TIMEOUT, [], expanded
+        entry = queues.next()
+        if entry is None:
             return SearchOutcome.UNSOLVABLE, [], expanded
-        entry = (before, via, 0, depth + 1)
+        before, via, depth = entry
 
 
-def _over(config: SearchConfig, deadline: Deadline, expanded: int) -> SearchOutcome | None:
-    if expanded >= config.max_expansions:
-        return SearchOutcome.CUT_SHORT
-    return SearchOutcome.TIMEOUT if deadline.over else None
+class _Queues:
+    """Steps that wait: all of them, and those that are helpful; nearest first."""
+
+    def __init__(self) -> None:
+        self.everyone: list[tuple[int, int, int, int, int]] = []
+        self.helpful: list[tuple[int, int, int, int, int]] = []
+        self.order = self.credit = 0
+
+    def add(self, h: int, depth: int, state: int, ready: list[int], helpful: set[int]) -> None:
+        """The steps that can be taken in a state."""
+        for index in ready:
+            self.order += 1
+            item = (h, depth, self.order, state, index)
+            heapq.heappush(self.everyone, item)
+            if index in helpful:
+                heapq.heappush(self.helpful, item)
+
+    def next(self) -> tuple[int, int, int] | None:
+        """The state, the step and the depth to which it leads; None when none is left."""
+        if self.helpful and (self.credit > 0 or not self.everyone or self.order % (BOOST + 1)):
+            self.credit -= 1
+            _, depth, _, state, index = heapq.heappop(self.helpful)
+        elif self.everyone:
+            _, depth, _, state, index = heapq.heappop(self.everyone)
+        else:
+            return None
+        return state, index, depth + 1
 
 
 def _path(parents: dict[int, tuple[int, int, int]], state: int) -> list[int]:

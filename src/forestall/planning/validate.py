@@ -163,9 +163,9 @@ def bindings(
         faultless.append([])
         for thing in things:
             bound = {variable: thing}
-            if not any(fails(x.bind(bound)) for x in alone):
-                if not any(happened(x.bind(bound)) for x in never):
-                    faultless[-1].append(thing)
+            wrong = any(fails(x.bind(bound)) for x in alone)
+            if not wrong and not any(happened(x.bind(bound)) for x in never):
+                faultless[-1].append(thing)
     for choices in (faultless, every):
         for values in islice(different(choices, [True] * len(names)), MAX_BINDINGS):
             yield dict(zip(names, values, strict=True))
