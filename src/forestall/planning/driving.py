@@ -56,8 +56,7 @@ def _place(state: State, name: str) -> str | None:
     """Where the robot stands to handle a thing; None for what does not exist yet."""
     if name not in state.kinds:
         return None
-    served = _served(state, name)
-    return state.root(name) if served is None else served
+    return state.follow(("place", name), lambda: _served(state, name) or state.root(name))
 
 
 def _served(state: State, name: str) -> str | None:

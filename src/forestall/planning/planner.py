@@ -240,7 +240,7 @@ class _Planning:
             return Planned(ReplanOutcome.TIMEOUT, note="a plan was found too late to be checked")
         if final is None:
             return Planned(ReplanOutcome.REJECTED, note=note)
-        denied = next((s for s in subtasks if is_refused(s, self.refused)), None)
+        denied = is_refused(subtasks, self.refused)
         if denied is not None:
             return Planned(ReplanOutcome.REJECTED, note=f"{denied} was refused")
         if deadline.cancelled:

@@ -5,7 +5,7 @@ Called by `planner` and `replanning`; calls `execute` and `driving`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 
 from forestall.planning.drafts import Draft
 from forestall.planning.driving import landmark_of
@@ -14,18 +14,36 @@ from forestall.planning.state import State
 from forestall.types.plan import Subtask, same_step
 
 
-def is_refused(step: Subtask, refused: Iterable[Subtask]) -> bool:
-    """Whether a step is one of those; a category in one of them stands for all of its things."""
-    return any(same_step(step, one) for one in refused)
+def is_refused(steps: Iterable[Subtask], refused: Collection[Subtask]) -> Subtask | None:
+    """The first step that was refused; a category in one of them stands for all of its things."""
+    if not refused:
+        return None
+    return next((s for s in steps if any(same_step(s, one) for one in refused)), None)
 
 
 def unexplained(state: State, refused: Iterable[Subtask]) -> frozenset[Subtask]:
-    """Refused steps that a state allows.
+    """Refused steps of which a state does not say why.
 
-    What the state itself forbids may be tried once that has changed; of what it allows nothing
-    says what would have to change, and nothing is the same way only better.
+    Where one of its own needs about the arguments fails, the step may be tried once that holds. Of
+    the others nothing says what would have to change, and they would be refused again.
     """
-    return frozenset(s for s in refused if not isinstance(perform(state, s), Refusal))
+    found = set()
+    for step in refused:
+        done = perform(state, step)
+        if not isinstance(done, Refusal) or not any(
+            set(x.args) & set(step.args) for x in done.lacking
+        ):
+            found.add(step)
+    return frozenset(found)
+
+
+def no_other(state: State, refused: Iterable[Subtask]) -> Iterator[str]:
+    """For each refused step a sentence that names the things of which there is only the one."""
+    for step in sorted(refused):
+        kinds = [state.kinds[a] for a in step.args if a in state.kinds]
+        alone = list(dict.fromkeys(k for k in kinds if len(state.instances(k)) == 1))
+        other = f"there is no other {' and no other '.join(alone)}" if alone else "no other will do"
+        yield f"{step} was refused, and {other}"
 
 
 def barred_by(state: State, refused: frozenset[Subtask]) -> Callable[[Draft], bool] | None:
@@ -35,16 +53,15 @@ def barred_by(state: State, refused: frozenset[Subtask]) -> Callable[[Draft], bo
     driving = state.domain.driving()
 
     def barred(draft: Draft) -> bool:
-        if is_refused(draft.subtask, refused):
+        if is_refused((draft.subtask,), refused):
             return True
         subject = draft.over or next(reversed(draft.subtask.args), None)
         if driving is None or subject is None:
             return False
         held = {h for _, h in state.in_hands()}
         place = landmark_of(state, subject) if subject in state.kinds else subject
-        return subject not in held and is_refused(Subtask(driving.name, (place,)), refused)
+        if subject in held:
+            return False
+        return is_refused((Subtask(driving.name, (place,)),), refused) is not None
 
     return barred
-
-
-__all__ = ["barred_by", "is_refused", "unexplained"]

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import time
 
+from forestall.deadline import Deadline
 from forestall.domain.model import Domain
 from forestall.planning.planner import plan_goal
+from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import as_checked, observed
 from forestall.seams import PlanValidator
@@ -36,23 +38,34 @@ class GoalReplanner:
         self.domain = domain
         self.config = config or SearchConfig()
 
-    def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
-        """A plan for the goal; of the diagnosis only counts whether anything must change."""
+    def replan(
+        self, context: BoundaryContext, diagnosis: Diagnosis, deadline: Deadline | None = None
+    ) -> Replan:
+        """A plan for the goal; of the diagnosis only counts whether anything must change.
+
+        Until the deadline, however much time `config` gives; without what the robot has refused.
+        """
         start_s = time.perf_counter()
         if not diagnosis.must_change:
             outcome = ReplanOutcome.NOTHING_TO_CHANGE
             return Replan(outcome, producer=self.name, note=diagnosis.cause)
         goal = context.task.goal
         state = observed(context.graph, self.domain)
-        planned = plan_goal(state, goal, self.config)
+        refused = unexplained(state, context.refused)
+        planned = plan_goal(state, goal, self.config, deadline, refused)
         plan, check, outcome, note = None, None, planned.outcome, planned.note
         if outcome is ReplanOutcome.SOLVED:
             plan = Plan(planned.subtasks, context.plan.goal or goal.text)
             check = self.validator.check(plan, context.graph, goal)
-            if check.ok:
+            denied = is_refused(check.plan or plan, refused)
+            if denied is not None:
+                outcome, note = ReplanOutcome.REJECTED, f"the robot has refused {denied}"
+            elif check.ok:
                 plan = as_checked(plan, check, state)
             else:
                 outcome, note = ReplanOutcome.REJECTED, check.reason
+        if outcome is not ReplanOutcome.SOLVED:
+            note = "; ".join((*no_other(state, refused), note))
         return Replan(
             outcome,
             plan,

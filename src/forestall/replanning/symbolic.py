@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from forestall.deadline import Deadline, TimeUp
 from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.planning.goals import alternatives
 from forestall.planning.planner import Planned, plan_goal, plan_to
+from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
-from forestall.planning.validate import as_checked, observed, unsupported
+from forestall.planning.validate import as_checked, observed, unmet, unsupported
 from forestall.seams import PlanValidator
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Plan, Subtask
@@ -28,14 +30,20 @@ from forestall.types.verdict import Diagnosis, PlanCheck, Replan, ReplanOutcome
 
 @dataclass(slots=True)
 class _Attempts:
-    """What the attempts of one replanning cost and how they failed."""
+    """What the attempts of one replanning may take and try, what they cost and how they failed."""
 
     start_s: float
+    deadline: Deadline
+    refused: frozenset[Subtask] = frozenset()
     expanded: int = 0
     timed_out: bool = False
     unproven: bool = False
     notes: tuple[str, ...] = ()
     rejected: tuple[Plan, PlanCheck] | None = None
+
+    def share(self) -> Deadline:
+        """Half of the time that is left, so that one attempt leaves some to the next."""
+        return self.deadline.within(self.deadline.left() / 2)
 
     def count(self, planned: Planned) -> Planned:
         self.expanded += planned.expanded
@@ -52,7 +60,7 @@ class PlannerReplanner:
     Args:
         validator: accepts or refuses every plan.
         domain: what is planned in.
-        config: bounds of each single search.
+        config: bounds of one replanning, whatever it tries; of the states those of each search.
     """
 
     name = "planner"
@@ -64,9 +72,28 @@ class PlannerReplanner:
         self.domain = domain
         self.config = config or SearchConfig()
 
-    def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
-        """Make the corrected plan for the rest of the task, from the observed state."""
-        attempts = _Attempts(time.perf_counter())
+    def replan(
+        self, context: BoundaryContext, diagnosis: Diagnosis, deadline: Deadline | None = None
+    ) -> Replan:
+        """Make the corrected plan for the rest of the task, from the observed state.
+
+        Args:
+            context: what is known; what the robot has refused, though the state allows it, is not
+                tried again.
+            diagnosis: what must change.
+            deadline: when to stop, however much time there is by itself; it may be cancelled from
+                another thread, and the answer then comes within milliseconds.
+        """
+        limit = (deadline or Deadline()).within(self.config.time_limit_s)
+        attempts = _Attempts(time.perf_counter(), limit)
+        try:
+            return self._replan(attempts, context, diagnosis)
+        except TimeUp as late:
+            return self._ended(attempts, ReplanOutcome.TIMEOUT, str(late))
+
+    def _replan(
+        self, attempts: _Attempts, context: BoundaryContext, diagnosis: Diagnosis
+    ) -> Replan:
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
         wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.domain)]
@@ -74,9 +101,13 @@ class PlannerReplanner:
             names = ", ".join(map(str, diagnosis.must_change))
             return self._ended(attempts, ReplanOutcome.UNSUPPORTED, f"no skill is about {names}")
         state = observed(context.graph, self.domain)
+        attempts.refused = unexplained(state, context.refused)
         repairs: list[Planned] = []
         for repair in self._repairs(attempts, state, context, wanted, diagnosis.must_stay):
-            for rest in _rests(context, state, bool(repair.subtasks)):
+            rests = _rests(context, state, bool(repair.subtasks))
+            if context.refused and repair.final and not unmet((repair.final,), context.task.goal):
+                rests = ((), *rests)  # what was wanted was all that is left to do
+            for rest in rests:
                 accepted = self._checked(attempts, context, state, (*repair.subtasks, *rest))
                 if accepted is not None:
                     return accepted
@@ -84,7 +115,15 @@ class PlannerReplanner:
         for repair in (*repairs[:1], Planned(ReplanOutcome.SOLVED, (), state)):
             if repair.final is None or not context.task.goal.literals:
                 continue  # without a goal there is nothing to plan for but what was left
-            onward = attempts.count(plan_goal(repair.final, context.task.goal, self.config))
+            onward = attempts.count(
+                plan_goal(
+                    repair.final,
+                    context.task.goal,
+                    self.config,
+                    attempts.deadline,
+                    attempts.refused,
+                )
+            )
             if onward.outcome is ReplanOutcome.SOLVED:
                 steps = (*repair.subtasks, *onward.subtasks)
                 accepted = self._checked(attempts, context, state, steps)
@@ -120,7 +159,7 @@ class PlannerReplanner:
                 solved = True
                 yield planned
         if len(wanted) > 1 and not solved:
-            possible = [x for x in wanted if self._can(state, x)]
+            possible = [x for x in wanted if self._can(attempts, state, x)]
             if possible and len(possible) < len(wanted):
                 yield from self._repairs(attempts, state, context, possible, must_stay)
                 return
@@ -136,19 +175,24 @@ class PlannerReplanner:
         facts: Sequence[Literal],
         widen: bool = False,
     ) -> Planned:
-        goals = alternatives(state, Goal("", literals=tuple(facts)))
-        planned = attempts.count(plan_to(state, goals, self.config, widen=widen))
+        planned = attempts.count(self._to(attempts, state, facts, widen))
         running = _left_running(state, planned, facts)
         if not running:
             return planned
-        goals = alternatives(state, Goal("", literals=(*facts, *running)))
-        tidy = attempts.count(plan_to(state, goals, self.config, widen=False))
+        tidy = attempts.count(self._to(attempts, state, (*facts, *running)))
         return tidy if tidy.outcome is ReplanOutcome.SOLVED else planned
 
-    def _can(self, state: State, literal: Literal) -> bool:
-        goals = alternatives(state, Goal("", literals=(literal,)))
-        planned = plan_to(state, goals, self.config, widen=False)
-        return planned.outcome is ReplanOutcome.SOLVED
+    def _to(
+        self, attempts: _Attempts, state: State, facts: Sequence[Literal], widen: bool = False
+    ) -> Planned:
+        share = attempts.share()
+        goals = alternatives(state, Goal("", literals=tuple(facts)), deadline=share)
+        return plan_to(
+            state, goals, self.config, widen=widen, deadline=share, refused=attempts.refused
+        )
+
+    def _can(self, attempts: _Attempts, state: State, literal: Literal) -> bool:
+        return self._to(attempts, state, (literal,)).outcome is ReplanOutcome.SOLVED
 
     def _checked(
         self,
@@ -158,7 +202,12 @@ class PlannerReplanner:
         subtasks: Sequence[Subtask],
     ) -> Replan | None:
         plan = Plan(tuple(subtasks), context.plan.goal or context.task.goal.text)
+        attempts.deadline.check()
         check = self.validator.check(plan, context.graph, context.task.goal)
+        denied = is_refused(check.plan or plan, attempts.refused)
+        if denied is not None:
+            reason = f"the robot has refused {denied}, and nothing about it has changed"
+            check = replace(check, ok=False, reason=reason)
         if not check.ok:
             attempts.rejected = attempts.rejected or (plan, check)
             return None
@@ -177,7 +226,7 @@ class PlannerReplanner:
         if lost:
             note = f"{', '.join(dict.fromkeys(lost))}: its place is not known"
             return self._ended(attempts, ReplanOutcome.UNSOLVABLE, note)
-        note = "; ".join(dict.fromkeys(attempts.notes))
+        note = "; ".join(dict.fromkeys((*no_other(state, attempts.refused), *attempts.notes)))
         if attempts.timed_out:
             return self._ended(attempts, ReplanOutcome.TIMEOUT, note)
         if attempts.rejected is not None and not attempts.notes:
