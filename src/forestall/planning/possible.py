@@ -31,6 +31,8 @@ T = TypeVar("T")
 _RECENT = 8
 STEPS = 16
 """How many facts back it is asked what could bring them about; what lies further is possible."""
+LARGE = 100
+"""Among more things than this only kinds are asked for: the rest takes long and tells little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,7 @@ class Possible(Grounder):
             for n in names
         }
         self._steps = 0
+        self.most = STEPS if len(things) <= LARGE else 0
         self._can: dict[tuple[str, ...], bool] = {}
         self._bindings: dict[tuple[int, tuple[str, ...]], tuple[Names, ...]] = {}
         self._options: dict[tuple[object, ...], tuple[str, ...]] = {}
@@ -69,8 +72,9 @@ class Possible(Grounder):
             return self.number_of(atom)
         found = self._can.get(atom)
         if found is None:
-            if self._steps == STEPS:
-                return self.number_of(atom)
+            self.in_time()
+            if self._steps == self.most:
+                return self.number_of(atom) if self._of_such_kinds(predicate, args) else False
             self._can[atom] = False
             with self._step_back(self._can, atom):
                 found = self._can[atom] = any(
@@ -78,13 +82,20 @@ class Possible(Grounder):
                 )
         return self.number_of(atom) if found else False
 
+    def derived(self, predicate: str, args: tuple[str, ...]) -> Node:
+        """A derived fact; among very many things it is not asked what it would take."""
+        if self.most or predicate in self.rigid:
+            return super().derived(predicate, args)
+        return self.number_of((predicate, *args))
+
     def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Sequence[str]:
         """What stands at a position or could be brought there."""
         key = (predicate, position, *args[:position], *args[position + 1 :])
         found = self._options.get(key)
         if found is None:
-            if self._steps == STEPS:
-                return self.names
+            self.in_time()
+            if self._steps == self.most:
+                return self._of_kinds(predicate, position)
             self._options[key] = ()
             names: dict[str, None] = {}
             atom = (predicate, *(a if i != position else "?" for i, a in enumerate(args)))
@@ -99,6 +110,36 @@ class Possible(Grounder):
             found = self._options[key] = tuple(names)
         now = [x for x in self.state.related(predicate, position, args) if x not in found]
         return (*now, *found)
+
+    def _of_such_kinds(self, predicate: str, args: tuple[str, ...]) -> bool:
+        """Whether some way brings a fact about things of such kinds about."""
+        key = (predicate, *(self.categories.get(a, a) for a in args))
+        found = self._can.get(key)
+        if found is None:
+            found = self._can[key] = any(
+                all(self._fits(way, i, a) for i, a in enumerate(args))
+                for way in self.ways.get(predicate, ())
+            )
+        return found
+
+    def _of_kinds(self, predicate: str, position: int) -> tuple[str, ...]:
+        """What is of a kind that some way brings to a position."""
+        key = (predicate, position)
+        found = self._options.get(key)
+        if found is None:
+            ways = self.ways.get(predicate, ())
+            found = tuple(n for n in self.names if any(self._fits(w, position, n) for w in ways))
+            self._options[key] = found
+        return found
+
+    def _fits(self, way: Way, position: int, name: str) -> bool:
+        assert isinstance(way.what, Literal)
+        variable = way.what.args[position]
+        if not variable.startswith("?"):
+            return variable == name
+        own = (*way.schema.parameters, *way.effect.variables)
+        kind = next((p.kind for p in own if p.name == variable), None)
+        return kind is None or (name in self.categories and self.is_a(name, kind))
 
     @contextmanager
     def _step_back(self, known: dict[K, T], key: K) -> Iterator[None]:

@@ -22,7 +22,7 @@ from forestall.domain.formula import (
 )
 from forestall.domain.schema import Copy, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, makeable
-from forestall.planning.grounder import Universe
+from forestall.planning.grounder import Universe, rigid_of
 from forestall.planning.possible import Names, Possible, Way, possible
 from forestall.planning.state import State
 from forestall.types.facts import Literal
@@ -73,12 +73,20 @@ def narrowed(
         closure = _Closure(state, world, shunned)
         closure.keep(h for _, h in state.in_hands())
         closure.keep(x for x in also if x in state.kinds)
+        closure.keep(_map(state))
         for part in dict.fromkeys(p for goal in goals for p in goal):
             closure.want(part)
     chosen = _supports(state, closure.kept, closure.cleared, shunned)[:SUPPORTS]
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
     return Universe(things, closure.made, frozenset(closure.purposeful), tuple(chosen))
+
+
+def _map(state: State) -> list[str]:
+    """Things of one kind that a relation joins which nothing changes: where a way may lead over."""
+    lasting = rigid_of(state.domain) & state.domain.relations.keys()
+    joined = [f[1:] for f in sorted(state.facts) if f[0] in lasting] if lasting else []
+    return [x for args in joined for x in args if len({state.kinds.get(a) for a in args}) == 1]
 
 
 def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[str]) -> list[str]:
@@ -251,6 +259,9 @@ class _Closure:
 
     def _best(self, found: Sequence[Names], new: set[str], most: int = GROUPS) -> list[Names]:
         """The most promising bindings, one for each combination of categories."""
+        if len(found) == 1:
+            self.keep(found[0][v] for v in new if v in found[0])
+            return list(found)
         groups: dict[tuple[str, ...], list[Names]] = {}
         categories = self.world.categories
         for bound in found:
@@ -355,6 +366,11 @@ class _Closure:
                 return
         for way in self.world.ways.get(f"not {literal.predicate}", ()):
             self._follow(way, (literal.predicate, *literal.args), literal, depth)
+        for name, other in predicates.items() if group is not None else ():
+            if other.group == group and name != literal.predicate:  # what begins ends the other
+                atom = (name, literal.args[0], *("?" for _ in other.parameters[1:]))
+                for way in self.world.ways.get(name, ()):
+                    self._follow(way, atom, literal, depth)
 
 
 def _denied(conditions: Sequence[Formula], copy: Copy, value: str) -> bool:
