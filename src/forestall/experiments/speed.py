@@ -24,24 +24,29 @@ from forestall.assembly.parts import Assembly
 from forestall.comparison.timing import score_times
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, ForestallError
+from forestall.experiments import yard
 from forestall.experiments.conduct import Progress
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
 from forestall.kinds import PERCEIVER, REPLANNER, SEGMENTER
+from forestall.planning.planner import plan_goal
 from forestall.seams import OpenWorld, Replanner
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext
-from forestall.types.verdict import Diagnosis
+from forestall.types.verdict import Diagnosis, ReplanOutcome
 
 KIND = "speed"
 
 TASK = "heat-potato"
 """What is timed."""
 
-GROUPS = ("pictures and graphs", "comparisons", "episodes")
+GROUPS = ("pictures and graphs", "comparisons", "plans", "episodes")
 """What is timed together, in this order."""
+
+THINGS = 200
+"""In the yard in which is planned."""
 
 REPEAT = 10
 """How often each is timed when nothing is said."""
@@ -121,7 +126,8 @@ def take(job: Timing) -> Timed:
     parts: dict[str, Callable[[], list[dict[str, Any]]]] = {
         GROUPS[0]: lambda: _pictures(job.repeat, job.seed),
         GROUPS[1]: lambda: _comparisons(job.repeat, job.seed),
-        GROUPS[2]: lambda: _episodes(job.seed),
+        GROUPS[2]: lambda: _large_plans(job.repeat, job.seed),
+        GROUPS[3]: lambda: _episodes(job.seed),
     }
     return Timed(job.group, tuple(parts[job.group]()), _machine())
 
@@ -185,6 +191,19 @@ def _plans(
     known = [x for x in lacking if not any(a.startswith("?") for a in x.args)]
     wanted = tuple(x for x in known if x.predicate == domain.roles.holding or x.is_state)[:2]
     return _timed(repeat, lambda: replanner.replan(context, Diagnosis("a measurement", wanted)))
+
+
+def _large_plans(repeat: int, seed: int) -> list[dict[str, Any]]:
+    """Plans among many things, each in another yard: nothing is remembered from the one before."""
+    times, solved = [], 0
+    for problem in (yard.drawn(THINGS, seed + k) for k in range(repeat)):
+        started = time.perf_counter()
+        planned = plan_goal(*problem)
+        times.append(1000 * (time.perf_counter() - started))
+        solved += planned.outcome is ReplanOutcome.SOLVED
+    skills = len(yard.domain().skills)
+    what = f"plan among {THINGS} things with {skills} skills ({solved} of {repeat} found)"
+    return [_row(what, "ms", times, 1000)]
 
 
 def _timed(repeat: int, what: Callable[[], object]) -> list[float]:

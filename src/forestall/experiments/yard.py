@@ -203,7 +203,7 @@ def domain() -> Domain:
 
 
 def drawn(count: int, seed: int) -> tuple[State, Goal]:
-    """A yard of so many things, and what is to become of three of its crates."""
+    """A yard of so many things, and what is to become of two of its crates."""
     rng = np.random.default_rng(seed)
     kinds: dict[str, str] = {}
     for category, share in SHARES:
@@ -223,13 +223,13 @@ def drawn(count: int, seed: int) -> tuple[State, Goal]:
     values = {(n, a): v for n, c in kinds.items() for a, v in domain().default_states(c).items()}
     for bay in of["Bay"]:
         values[bay, "gate"] = str(rng.choice(["shut", "open"]))
-    one, two, three = (str(c) for c in rng.choice(of["Crate"], 3, replace=False))
+    one, two = (str(c) for c in rng.choice(of["Crate"], 2, replace=False))
     bay, rack = str(rng.choice(of["Bay"])), str(rng.choice(of["Rack"]))
     wanted = (
         Literal("in_bay", (one, bay)),
         Literal("seal", (one,), "tight"),
         Literal("shelved", (two, rack)),
-        Literal("label", (three,), "printed"),
+        Literal("label", (two,), "printed"),
         Literal("gate", (bay,), "shut"),
     )
     return State(domain(), kinds, values, facts), Goal("", literals=wanted)

@@ -198,9 +198,18 @@ class _Numbering:
 
     def _bases(self, node: Node) -> frozenset[int]:
         """Base facts on which a node depends."""
+        if not isinstance(node, Junction):
+            fact = abs(int(node))
+            known = self._base_of.get(fact)
+            if known is None:
+                known = self._base_of[fact] = self._bases_of((fact,)) if fact > 1 else frozenset()
+            return known
+        return self._bases_of(abs(f) for f in facts_of(node))
+
+    def _bases_of(self, facts: Iterable[int]) -> frozenset[int]:
         found: set[int] = set()
         seen: set[int] = set()
-        waiting = [abs(f) for f in facts_of(node)]
+        waiting = list(facts)
         while waiting:
             fact = waiting.pop()
             if fact in seen:

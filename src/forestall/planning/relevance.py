@@ -23,11 +23,16 @@ from forestall.domain.formula import (
 from forestall.domain.schema import Copy, PredicateKind, Process, Skill
 from forestall.planning.goals import Conjunction, makeable
 from forestall.planning.grounder import Universe, rigid_of
+from forestall.planning.needs import asks, conjuncts
 from forestall.planning.possible import Names, Possible, Way, possible
 from forestall.planning.state import State
 from forestall.types.facts import Literal
 
 DEPTH = 9
+NEAR = 3
+"""What was looked at less than so many steps before that is looked at again from nearer."""
+MANY = 12
+"""Of more bindings than this only those are looked at for which most holds already."""
 GROUPS = 4
 """How many categories of things are tried for one open parameter."""
 SUPPORTS = 2
@@ -121,7 +126,7 @@ class _Closure:
         self.made: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self.purposeful: set[str] = set()
         self.cleared: set[str] = set()
-        self.visited: set[tuple[object, ...]] = set()
+        self.visited: dict[tuple[object, ...], int] = {}
 
     def keep(self, names: Iterable[str]) -> None:
         """Keep things, with what has them, what blocks them, and what fills a limited place."""
@@ -208,7 +213,7 @@ class _Closure:
             key = ("rely", formula.predicate, *args)
             if key in self.visited:  # definitions may lead back to themselves
                 return
-            self.visited.add(key)
+            self.visited[key] = 0
             if known is not None and known.definition is not None and formula.value == "true":
                 inner = {p.name: a for p, a in zip(known.parameters, args, strict=True)}
                 yield self.schemas.normal(known.definition), inner
@@ -293,9 +298,9 @@ class _Closure:
 
     def _achieve(self, literal: Literal, depth: int) -> None:
         key = (literal.predicate, *literal.args, literal.value)
-        if key in self.visited or depth > DEPTH:
-            return
-        self.visited.add(key)
+        if depth > DEPTH or self.visited.get(key, DEPTH + 1) <= max(depth, DEPTH - NEAR):
+            return  # anew only where it was cut off soon and would go further now
+        self.visited[key] = depth
         known = self.domain.predicates.get(literal.predicate)
         if known is None or known.kind is PredicateKind.STATIC:
             return
@@ -339,6 +344,8 @@ class _Closure:
             found = having if having or movable else found
         hand = way.schema.hand if isinstance(way.schema, Skill) else None
         most = GROUPS if isinstance(way.schema, Process) or hand in new else 1
+        if len(found) > MANY:
+            found = self._nearest(way, found)
         for binding in self._best(found, new, most):
             for variable in new & binding.keys():
                 if variable == hand or isinstance(way.schema, Process):
@@ -348,6 +355,13 @@ class _Closure:
             if isinstance(way.what, Copy):
                 wanted = Literal(way.what.attribute, (binding[way.what.source],), literal.value)
                 self.need(wanted, {}, depth + 1)
+
+    def _nearest(self, way: Way, found: Sequence[Names]) -> list[Names]:
+        """Of many bindings those for which most of what a skill asks for holds now."""
+        parts = conjuncts(self.schemas.normal(way.simple))
+        lacking = [sum(not self.state.true(p, b) for p in parts) for b in found]
+        least = min(lacking)
+        return [b for b, count in zip(found, lacking, strict=True) if count == least]
 
     def _end(self, literal: Literal, depth: int) -> None:
         """A relation is to end: what is there is taken away, or the skill that says so is used."""
@@ -370,7 +384,8 @@ class _Closure:
             if other.group == group and name != literal.predicate:  # what begins ends the other
                 atom = (name, literal.args[0], *("?" for _ in other.parameters[1:]))
                 for way in self.world.ways.get(name, ()):
-                    self._follow(way, atom, literal, depth)
+                    if asks((way.simple,), literal.predicate):
+                        self._follow(way, atom, literal, depth)
 
 
 def _denied(conditions: Sequence[Formula], copy: Copy, value: str) -> bool:
