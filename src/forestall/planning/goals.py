@@ -142,7 +142,7 @@ def different(
             elif name not in taken and assigned(rest, now := taken | {name}):
                 yield name, now
 
-    if not assigned([c for c, d in several if d]):
+    if not all(choices) or not assigned([c for c, d in several if d]):
         return
     if not several:
         yield ()
