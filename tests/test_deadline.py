@@ -6,7 +6,7 @@ import pytest
 from forestall.deadline import Deadline, TimeUp
 
 
-def test_without_a_limit_only_the_switch_stops_it():
+def test_without_a_limit_only_the_switch_stops_it() -> None:
     deadline = Deadline(None)
     assert not deadline.over
     assert deadline.left() == float("inf")
@@ -18,7 +18,7 @@ def test_without_a_limit_only_the_switch_stops_it():
         deadline.check()
 
 
-def test_time_runs_from_when_it_is_made():
+def test_time_runs_from_when_it_is_made() -> None:
     deadline = Deadline(0.01)
     assert 0.0 < deadline.left() <= 0.01
     time.sleep(0.02)
@@ -28,14 +28,14 @@ def test_time_runs_from_when_it_is_made():
         deadline.check()
 
 
-def test_an_inner_deadline_never_outlasts_the_outer_one():
+def test_an_inner_deadline_never_outlasts_the_outer_one() -> None:
     outer = Deadline(0.05)
     assert outer.within(60.0).left() <= 0.05
     assert outer.within(0.0).over
     assert not outer.over
 
 
-def test_cancelling_goes_inwards_and_not_outwards():
+def test_cancelling_goes_inwards_and_not_outwards() -> None:
     outer = Deadline(None)
     inner = outer.within(60.0)
     innermost = inner.within(None)
@@ -48,7 +48,7 @@ def test_cancelling_goes_inwards_and_not_outwards():
     assert other.over
 
 
-def test_another_thread_may_stop_the_work():
+def test_another_thread_may_stop_the_work() -> None:
     deadline = Deadline(30.0)
     stopped = threading.Event()
 

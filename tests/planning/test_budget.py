@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -38,8 +39,8 @@ def mugs(count: int) -> SceneGraph:
 
 def each(count: int, *texts: str) -> Goal:
     """A goal that asks the same of so many different mugs."""
-    names = {f"m{i}": "Mug" for i in range(count)}
-    return goal(*(t.replace("?", f"?m{i}") for i in range(count) for t in texts), **names)
+    whole = goal(*(t.replace("?", f"?m{i}") for i in range(count) for t in texts))
+    return replace(whole, variables=tuple((f"?m{i}", "Mug") for i in range(count)))
 
 
 def test_nine_variables_over_sixty_things_are_planned_for_and_checked() -> None:

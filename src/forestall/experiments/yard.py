@@ -77,7 +77,7 @@ values = ["full", "low", "flat"]
 [attributes.scanned]
 values = ["no", "yes"]
 [attributes.seal]
-values = ["none", "tight"]
+values = ["none", "sealed"]
 [attributes.label]
 values = ["none", "printed"]
 
@@ -178,7 +178,7 @@ effects = ["scanned(?thing)=yes"]
 [skills.seal]
 parameters = ["thing - Crate", "bay - bay"]
 needs = [{ fact = "in_bay(?thing, ?bay) and scanned(?thing)=yes", else = "{thing} is not scanned" }]
-effects = ["seal(?thing)=tight"]
+effects = ["seal(?thing)=sealed"]
 [skills.print_label]
 parameters = ["thing - load", "bay - bay"]
 needs = [{ fact = "in_bay(?thing, ?bay) and scanned(?thing)=yes", else = "{thing} is not scanned" }]
@@ -186,7 +186,7 @@ effects = ["label(?thing)=printed"]
 [skills.pack]
 parameters = ["thing - Crate", "bay - bay"]
 makes = [{ variable = "pallet", source = "thing", by = "packs_into" }]
-needs = [{ fact = "in_bay(?thing, ?bay) and seal(?thing)=tight", else = "{thing} is not sealed" }]
+needs = [{ fact = "in_bay(?thing, ?bay) and seal(?thing)=sealed", else = "{thing} is not sealed" }]
 effects = ["in_bay(?pallet, ?bay)", "gone(?thing)"]
 
 [processes.night]
@@ -227,7 +227,7 @@ def drawn(count: int, seed: int) -> tuple[State, Goal]:
     bay, rack = str(rng.choice(of["Bay"])), str(rng.choice(of["Rack"]))
     wanted = (
         Literal("in_bay", (one, bay)),
-        Literal("seal", (one,), "tight"),
+        Literal("seal", (one,), "sealed"),
         Literal("shelved", (two, rack)),
         Literal("label", (two,), "printed"),
         Literal("gate", (bay,), "shut"),

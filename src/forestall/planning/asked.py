@@ -6,6 +6,7 @@ Called by `state`; calls `schemas`. Every node is true or false here, nothing is
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import get_ident
 from typing import TYPE_CHECKING
 
 from forestall.domain.evaluate import FALSE, TRUE, Circle, static_holds
@@ -26,7 +27,7 @@ class Asked:
         self.state, self.domain = state, state.domain
         self.schemas = schemas_of(state.domain)
         self._kinds = state.kinds
-        self._circles: dict[frozenset[str], Circle] = {}
+        self._circles: dict[tuple[int, frozenset[str]], Circle] = {}  # of each thread its own
 
     def things(self) -> Sequence[str]:
         """Every thing."""
@@ -88,7 +89,7 @@ class Asked:
     def derived(self, predicate: str, args: tuple[str, ...]) -> Node:
         """Whether a derived fact holds."""
         members = self.domain.recursive.get(predicate)
-        circle = None if members is None else self._circles.get(members)
+        circle = None if members is None else self._circles.get((get_ident(), members))
         if circle is not None:
             return circle.ask(self.domain.predicates[predicate], args) == TRUE
         return self.state.follow((predicate, *args), lambda: self._derived(predicate, args))
@@ -99,13 +100,14 @@ class Asked:
         if members is None:
             return self._defined(known, args)
         circle = Circle(lambda k, those: TRUE if self._defined(k, those) is True else FALSE)
-        self._circles[members] = circle
+        own = get_ident(), members
+        self._circles[own] = circle
         try:
             truth = circle.settle(known, args)
         finally:
-            del self._circles[members]
+            del self._circles[own]
         for fact, found in circle.now.items():
-            self.state.follow(fact, lambda found=found: found == TRUE)
+            self.state.know(fact, found == TRUE)
         return truth == TRUE
 
     def _defined(self, known: Predicate, args: tuple[str, ...]) -> Node:

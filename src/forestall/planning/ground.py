@@ -80,9 +80,8 @@ class _Grounding:
                 if not self.domain.skills[s].drives
             ]
             self.domain.__dict__["_skill_plans"] = plans
-        self.plans: list[_SkillPlan] = [
-            p for p in plans if skills is None or p.skill.name in skills
-        ]
+        chosen = (p for p in plans if skills is None or p.skill.name in skills)
+        self.plans: list[_SkillPlan] = list(chosen)
         self._seen: set[tuple[str, ...]] = set()
 
     def run(self) -> Grounding:

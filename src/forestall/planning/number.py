@@ -11,14 +11,13 @@ from dataclasses import replace
 
 from forestall.deadline import Deadline
 from forestall.domain.evaluate import DEEP
-from forestall.domain.formula import And, Formula
+from forestall.domain.formula import And, Formula, literals
 from forestall.domain.schema import PredicateKind
 from forestall.errors import InputError
 from forestall.planning.drafts import Change, Draft, Event, Grounding
 from forestall.planning.nodes import Junction, Node, facts_of
 from forestall.planning.problem import Atom, Effect, Happening, Operator, Problem, Rule, Stratum
 from forestall.planning.state import State, decided
-from forestall.types.facts import Literal
 
 Goal = tuple[Formula, ...]
 
@@ -63,19 +62,13 @@ def number(
 
 def _goal_node(grounding: Grounding, state: State, goal: Goal) -> Node:
     for part in goal:
-        for literal in _inside(part):
+        for literal, _ in literals(part):
             if not decided(state.domain, literal):
                 raise UnsupportedError(f"{literal} cannot be planned for")
     try:
         return grounding.grounder.schemas.formula(And(goal))(grounding.grounder, {})
     except InputError as error:
         raise UnsupportedError(str(error)) from error
-
-
-def _inside(part: Formula) -> Iterable[Literal]:
-    from forestall.domain.formula import literals
-
-    return [x for x, _ in literals(part)]
 
 
 class _Numbering:

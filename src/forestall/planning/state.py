@@ -294,6 +294,10 @@ class State:
             self._done[key] = act()
         return self._done[key]  # type: ignore[return-value]
 
+    def know(self, step: Hashable, found: object) -> None:
+        """Remember what `follow` would work out."""
+        self._done[step, self.at] = found
+
     @property
     def asked(self) -> Asked:
         """The state as what compiled formulas ask."""
