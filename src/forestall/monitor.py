@@ -173,7 +173,8 @@ class Monitor:
             assert run.last is not None
             told = replace(outcome, reason="")  # it may name what the robot has not seen
             if self._strategy.looks_after is not LooksAfter.SUBTASK:
-                answer = self._strategy.after_subtask(run.last, told)
+                known = replace(run.last, refused=tuple(run.refused()))
+                answer = self._strategy.after_subtask(known, told)
                 silent = answer.decision is Decision.PROCEED and answer.verdict is None
                 over = replace(run.last, when=When.AFTER, may_look=False)
                 return None if silent else self._conclude(over, answer)
