@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
+from forestall.reading.fields import Field
 from forestall.records.derived import Mark
-from forestall.records.fields import Field
 from forestall.records.verdicts import (
     diagnosis_from,
     diagnosis_json,

@@ -16,6 +16,8 @@ from typing import Any
 
 from forestall.errors import FileFormatError, InputError
 from forestall.files import naming, replace_file
+from forestall.reading.documents import parse_json
+from forestall.reading.fields import Field
 from forestall.records.boundaries import boundary_json, by_reference, executed_json
 from forestall.records.codec import (
     KIND,
@@ -27,7 +29,6 @@ from forestall.records.codec import (
     record_to_json,
 )
 from forestall.records.derived import alarm_at, new_plan
-from forestall.records.fields import Field, load_json
 from forestall.records.pictures import encode_jpeg, file_name
 from forestall.records.plain import plain
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord
@@ -165,7 +166,7 @@ def read_record(path: Path | str) -> EpisodeRecord:
     try:
         if path.suffix == ".jsonl":
             return _read_lines(text)
-        return record_from_json(load_json(text))
+        return record_from_json(parse_json(text))
     except FileFormatError as error:
         raise FileFormatError(f"{path}: {error}") from error
 
@@ -209,7 +210,7 @@ def _read_lines(text: str) -> EpisodeRecord:
         if not row:
             continue
         try:
-            events.append(Field(load_json(row), f"line {number}"))
+            events.append(Field(parse_json(row), f"line {number}"))
         except FileFormatError as error:
             if number == len(rows):  # the line that was being written when the run was killed
                 break

@@ -9,7 +9,7 @@ import base64
 import math
 from typing import Any
 
-from forestall.records.fields import Field
+from forestall.reading.fields import Field
 from forestall.types.demonstration import View
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph

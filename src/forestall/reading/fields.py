@@ -1,12 +1,11 @@
-"""Reading JSON that may be anything: every value knows its place, every error names it.
+"""Values that may be anything: each knows its place, every error names it.
 
-Used by the codec; calls nothing. What is wrong is a `FileFormatError` such as
-"boundaries[3].verdict.score: a number is expected, got 'high'".
+Used by the readers of graphs, records and memories; calls nothing. What is wrong is a
+`FileFormatError` such as "boundaries[3].verdict.score: a number is expected, got 'high'".
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,13 +13,9 @@ from enum import Enum
 from typing import Any, NoReturn, TypeVar
 
 from forestall.errors import FileFormatError, ForestallError
-from forestall.types.observation import Vec3
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
-
-MAX_DEPTH = 64
-"""How deep lists and objects of a record may nest; ours are at most twelve deep."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +100,7 @@ class Field:
             self.fail("a finite number")
         return number
 
-    def vector(self) -> Vec3:
+    def vector(self) -> tuple[float, float, float]:
         """Three numbers."""
         numbers = self.tuple_of(Field.number)
         if len(numbers) != 3:
@@ -130,50 +125,3 @@ class Field:
 
     def _name(self) -> str:
         return self.place or "the record"
-
-
-def load_json(text: str) -> Any:
-    """Parse a JSON document of finite depth, numbers and characters that can be written again.
-
-    Raises:
-        FileFormatError: it is none.
-    """
-    try:
-        data = json.loads(text, parse_constant=_no_constant)
-    except json.JSONDecodeError as error:
-        raise FileFormatError(f"damaged or truncated (line {error.lineno}): {error.msg}") from error
-    except RecursionError as error:
-        raise FileFormatError("damaged: it nests too deeply") from error
-    except ValueError as error:
-        raise FileFormatError(f"damaged: {error}") from error
-    if "\\u" in text:
-        _check_characters(data)
-    _check_depth(data)
-    return data
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number in JSON")
-
-
-def _check_characters(data: Any) -> None:
-    try:
-        json.dumps(data, ensure_ascii=False).encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise FileFormatError("damaged: it has half of a character") from error
-    except RecursionError as error:
-        raise FileFormatError("damaged: it nests too deeply") from error
-
-
-def _check_depth(data: Any) -> None:
-    level = [data]
-    for _ in range(MAX_DEPTH):
-        level = [
-            inner
-            for value in level
-            if isinstance(value, dict | list)
-            for inner in (value.values() if isinstance(value, dict) else value)
-        ]
-        if not level:
-            return
-    raise FileFormatError(f"damaged: it nests more than {MAX_DEPTH} deep")
