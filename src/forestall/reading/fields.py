@@ -17,6 +17,9 @@ from forestall.errors import FileFormatError, ForestallError
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
 
+MOST_NAME = 256
+"""How many characters a name may have."""
+
 
 @dataclass(frozen=True, slots=True)
 class Field:
@@ -54,15 +57,26 @@ class Field:
         field = self[key]
         return None if field.value is None else read(field)
 
+    def optional(self, key: str, read: Callable[[Field], T]) -> T | None:
+        """What is under a key, None where that is null or not there."""
+        field = self.find(key)
+        return None if field is None or field.value is None else read(field)
+
     def items(self) -> list[Field]:
         """The elements of a list."""
-        if not isinstance(self.value, list):
+        if not isinstance(self.value, list | tuple):
             self.fail("a list")
         return [Field(v, f"{self.place}[{i}]") for i, v in enumerate(self.value)]
 
     def tuple_of(self, read: Callable[[Field], T]) -> tuple[T, ...]:
         """Every element of a list, read."""
         return tuple(read(f) for f in self.items())
+
+    def at_most(self, most: int, read: Callable[[Field], T]) -> tuple[T, ...]:
+        """Every element of a list that may have so many."""
+        if isinstance(self.value, list | tuple) and len(self.value) > most:
+            raise FileFormatError(f"{self._name()}: at most {most} are read, got {len(self.value)}")
+        return self.tuple_of(read)
 
     def pairs(self, read: Callable[[Field], T]) -> tuple[tuple[str, T], ...]:
         """Every entry of an object, in order."""
@@ -74,6 +88,14 @@ class Field:
         """A text."""
         if not isinstance(self.value, str):
             self.fail("a text")
+        return self.value
+
+    def name(self) -> str:
+        """A text that names something; a whole number is taken as its digits."""
+        if isinstance(self.value, int) and not isinstance(self.value, bool):
+            return str(self.value)
+        if not isinstance(self.value, str) or not 0 < len(self.value) <= MOST_NAME:
+            self.fail(f"a name of 1 to {MOST_NAME} characters")
         return self.value
 
     def flag(self) -> bool:
@@ -124,4 +146,4 @@ class Field:
             raise FileFormatError(f"{self._name()} cannot be read: {error}") from error
 
     def _name(self) -> str:
-        return self.place or "the record"
+        return self.place or "the document"
