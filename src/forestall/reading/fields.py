@@ -7,6 +7,7 @@ Used by the readers of graphs, records and memories; calls nothing. What is wron
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -16,6 +17,8 @@ from forestall.errors import FileFormatError, ForestallError
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 MOST_NAME = 256
 """How many characters a name may have."""
@@ -94,9 +97,10 @@ class Field:
         """A text that names something; a whole number is taken as its digits."""
         if isinstance(self.value, int) and not isinstance(self.value, bool):
             return str(self.value)
-        if not isinstance(self.value, str) or not 0 < len(self.value) <= MOST_NAME:
-            self.fail(f"a name of 1 to {MOST_NAME} characters")
-        return self.value
+        name = self.value
+        if not isinstance(name, str) or not 0 < len(name) <= MOST_NAME or _CONTROL.search(name):
+            self.fail(f"a name of 1 to {MOST_NAME} characters that can be shown")
+        return name
 
     def flag(self) -> bool:
         """True or false."""

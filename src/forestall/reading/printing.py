@@ -24,6 +24,13 @@ def one_line(text: str) -> str:
     return printable(" ".join(text.split()))
 
 
+def shown(text: str) -> str:
+    """Likewise, and as it is where rich reads markup."""
+    from rich.markup import escape
+
+    return escape(one_line(text))
+
+
 def _steers(character: str) -> bool:
     return character in _TURNING or unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp")
 
