@@ -80,9 +80,9 @@ def test_a_file_that_is_no_record(tmp_path: Path, text: str, says: str) -> None:
 
 
 def test_no_file_and_no_text(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match="no record of a run"):
+    with pytest.raises(FileFormatError, match="cannot read record of a run"):
         read_record(tmp_path / "nowhere")
-    with pytest.raises(FileFormatError, match="no record of a run"):
+    with pytest.raises(FileFormatError, match="cannot read record of a run"):
         read_record(tmp_path)
     (tmp_path / RECORD_NAME).write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FileFormatError, match="not text"):

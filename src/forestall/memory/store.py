@@ -15,14 +15,16 @@ import os
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 
 from forestall.errors import MemoryFileError
 from forestall.memory.codec import DamageError, Encoded, EncodedStep, decode, encode
 from forestall.memory.images import ImageFolder
+from forestall.reading.files import MOST_BYTES
 from forestall.types.demonstration import Demonstration
 from forestall.types.observation import Rgb
 
@@ -260,6 +262,8 @@ class SqliteStore:
             uri, uri=True, timeout=self._busy_timeout_s, isolation_level=None
         )
         connection.row_factory = sqlite3.Row
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
+        connection.execute("PRAGMA trusted_schema = OFF")
         connection.execute("PRAGMA foreign_keys = ON")
         return connection
 
@@ -280,6 +284,10 @@ class SqliteStore:
                 raise MemoryFileError(
                     f"memory {self.path} has schema version {version}, this version of forestall "
                     f"reads {SCHEMA_VERSION}: record it again with 'forestall demos record'"
+                )
+            if self._schema() != _own_schema():
+                raise MemoryFileError(
+                    f"memory {self.path} is damaged: its tables are not those of a memory"
                 )
             problem = self._connection.execute("PRAGMA quick_check(1)").fetchone()[0]
             if problem != "ok":
@@ -306,6 +314,9 @@ class SqliteStore:
 
     def _tables(self) -> int:
         return int(self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+
+    def _schema(self) -> set[tuple[str, ...]]:
+        return _schema_of(self._connection)
 
     def _make(self) -> None:
         for statement in _SCHEMA.strip().removesuffix(";").split(";\n"):
@@ -370,6 +381,21 @@ class SqliteStore:
                     f"memory {self.path} cannot be read or written: {text}: is the disk full?"
                 ) from error
             raise MemoryFileError(f"memory {self.path} is damaged: {text}") from error
+
+
+def _schema_of(connection: sqlite3.Connection) -> set[tuple[str, ...]]:
+    """Tables, indexes, views and triggers, each with what made it."""
+    rows = connection.execute(
+        "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite\\_%' ESCAPE '\\'"
+    )
+    return {tuple(map(str, row)) for row in rows}
+
+
+@cache
+def _own_schema() -> frozenset[tuple[str, ...]]:
+    with closing(sqlite3.connect(":memory:")) as empty:
+        empty.executescript(_SCHEMA)
+        return frozenset(_schema_of(empty))
 
 
 @contextmanager

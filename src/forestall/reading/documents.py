@@ -27,7 +27,7 @@ MOST_TOML_BYTES = 2**20
 """How large a TOML or PDDL file may be; ours have at most 60 KiB."""
 
 _LARGEST = 2**63
-_UNUSUAL_NUMBER = re.compile(r"[0-9]{19}|[eE]\+?[0-9]{3}")
+_UNUSUAL_NUMBER = re.compile(r"[0-9]{19}|[0-9][eE]\+?[0-9]{3}")
 _LONG_KEY = re.compile(r"(?:[\w\"'-]+[ \t]*\.[ \t]*){64}")
 
 

@@ -6,11 +6,11 @@ Used by the readers of graphs, records and memories; calls nothing. What is wron
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 from typing import Any, NoReturn, TypeVar
 
 from forestall.errors import FileFormatError, ForestallError
@@ -18,6 +18,7 @@ from forestall.errors import FileFormatError, ForestallError
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
 
+_THREE = [float] * 3
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 MOST_NAME = 256
@@ -97,10 +98,9 @@ class Field:
         """A text that names something; a whole number is taken as its digits."""
         if isinstance(self.value, int) and not isinstance(self.value, bool):
             return str(self.value)
-        name = self.value
-        if not isinstance(name, str) or not 0 < len(name) <= MOST_NAME or _CONTROL.search(name):
+        if not isinstance(self.value, str) or not _shows(self.value):
             self.fail(f"a name of 1 to {MOST_NAME} characters that can be shown")
-        return name
+        return self.value
 
     def flag(self) -> bool:
         """True or false."""
@@ -122,16 +122,26 @@ class Field:
             number = float(self.value)
         except OverflowError:
             self.fail("a number")
-        if not math.isfinite(number):
+        if not isfinite(number):
             self.fail("a finite number")
         return number
 
     def vector(self) -> tuple[float, float, float]:
         """Three numbers."""
+        value = self.value
+        if type(value) is list and [type(v) for v in value] == _THREE and isfinite(sum(value)):
+            return (value[0], value[1], value[2])  # the same, faster: memories have thousands
         numbers = self.tuple_of(Field.number)
         if len(numbers) != 3:
             self.fail("three numbers")
         return (numbers[0], numbers[1], numbers[2])
+
+    def triple(self) -> tuple[str, str, str]:
+        """Three names, as a relation has them."""
+        names = self.tuple_of(Field.name)
+        if len(names) != 3:
+            self.fail("subject, predicate and object")
+        return (names[0], names[1], names[2])
 
     def member(self, kind: type[E]) -> E:
         """A member of an enumeration, by its value."""
@@ -151,3 +161,9 @@ class Field:
 
     def _name(self) -> str:
         return self.place or "the document"
+
+
+def _shows(name: str) -> bool:
+    if not 0 < len(name) <= MOST_NAME:
+        return False
+    return name.isprintable() or _CONTROL.search(name) is None

@@ -39,14 +39,20 @@ def read_bytes(path: Path, what: str, most: int = MOST_BYTES) -> bytes:
     return data
 
 
-def read_text(path: Path, what: str, most: int = MOST_BYTES) -> str:
+def read_text(path: Path, what: str, most: int = MOST_BYTES, torn: str = "strict") -> str:
     """The content of a UTF-8 text file, without a byte order mark.
+
+    Args:
+        path: of the file.
+        what: it should be.
+        most: bytes that it may have.
+        torn: "replace" where a character may be cut in half by a kill.
 
     Raises:
         FileFormatError: as `read_bytes`, or it is no text.
     """
     try:
-        return read_bytes(path, what, most).decode("utf-8-sig")
+        return read_bytes(path, what, most).decode("utf-8-sig", torn)
     except UnicodeDecodeError as error:
         raise FileFormatError(
             f"{path} is no {what}: it is not UTF-8 text (byte {error.start})"

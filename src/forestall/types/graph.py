@@ -221,10 +221,10 @@ class SceneGraph:
             raise FileFormatError(
                 f"scene graph format {data.get('format')!r}: this version reads {GRAPH_FORMAT}"
             )
+        relations = field.optional("relations", lambda f: f.at_most(MOST_RELATIONS, relation_from))
         return cls(
             nodes=field["nodes"].at_most(MOST_NODES, node_from),
-            relations=field.optional("relations", lambda f: f.at_most(MOST_RELATIONS, _relation))
-            or (),
+            relations=relations or (),
             subtask=field.optional("subtask", lambda f: f.parsed(Subtask.parse)),
             hidden=field.optional("hidden", lambda f: f.tuple_of(Field.name)) or (),
         )
@@ -296,8 +296,6 @@ def _feature(field: Field) -> bytes:
     return feature
 
 
-def _relation(field: Field) -> Relation:
-    names = field.tuple_of(Field.name)
-    if len(names) != 3:
-        field.fail("subject, predicate and object")
-    return Relation(*names)
+def relation_from(field: Field) -> Relation:
+    """A relation: [subject, predicate, object]."""
+    return Relation(*field.triple())
