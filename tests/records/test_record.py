@@ -85,7 +85,7 @@ def test_no_file_and_no_text(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="cannot read record of a run"):
         read_record(tmp_path)
     (tmp_path / RECORD_NAME).write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileFormatError, match="not text"):
+    with pytest.raises(FileFormatError, match="not UTF-8 text"):
         read_record(tmp_path)
 
 

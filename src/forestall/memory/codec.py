@@ -23,6 +23,7 @@ from forestall.reading.fields import Field
 from forestall.reading.files import MOST_BYTES
 from forestall.records.verdicts import view_from
 from forestall.types.demonstration import Demonstration, DemonstrationStep, View
+from forestall.types.feature import whole_numbers
 from forestall.types.graph import (
     GRAPH_FORMAT,
     ObjectNode,

@@ -32,13 +32,16 @@ def read_picture(path: Path, mode: str | None = None) -> Image.Image:
         FileFormatError: no picture, cut off, of another format than `FORMATS`, or larger than
             `MOST_PIXELS`.
     """
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     data = read_bytes(path, "picture", MOST_PICTURE_BYTES)
-    with decoding(path, f"a picture ({', '.join(FORMATS)})"):
+    with decoding(path, "a picture"):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our budget is less
-            image: Image.Image = Image.open(io.BytesIO(data), formats=FORMATS)
+            try:
+                image: Image.Image = Image.open(io.BytesIO(data), formats=FORMATS)
+            except UnidentifiedImageError as error:
+                raise FileFormatError(f"{path} is not a picture ({', '.join(FORMATS)})") from error
         width, height = image.size
         if width * height > MOST_PIXELS:
             raise FileFormatError(

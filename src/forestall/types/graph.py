@@ -221,9 +221,10 @@ class SceneGraph:
             raise FileFormatError(
                 f"scene graph format {data.get('format')!r}: this version reads {GRAPH_FORMAT}"
             )
+        nodes = field["nodes"].at_most(MOST_NODES, node_from)
         relations = field.optional("relations", lambda f: f.at_most(MOST_RELATIONS, relation_from))
         return cls(
-            nodes=field["nodes"].at_most(MOST_NODES, node_from),
+            nodes=nodes,
             relations=relations or (),
             subtask=field.optional("subtask", lambda f: f.parsed(Subtask.parse)),
             hidden=field.optional("hidden", lambda f: f.tuple_of(Field.name)) or (),
