@@ -23,6 +23,11 @@ VALUES = (
     [None], {"": None}, {"a": {"b": []}}, [0, 0, 0], [1, 2], ["a", "b", "c"], [[0] * 4] * 4,
 )  # fmt: skip
 
+PIECES = (
+    b"\x00", b"\xff\xfe", b"[" * 100_000, b'{"a":' * 50_000, b'"', b"NaN", b"\n", b"1e9999",
+    b"9" * 5000, b"(" * 5000, b"\\ud800", "\u202e".encode(), b"#", b"'''", b"=", b")",
+)  # fmt: skip
+
 
 def value(rng: Random) -> Any:
     """Anything that JSON can say, and some that it cannot."""
@@ -76,7 +81,7 @@ def _holds(holder: Any, key: Any, inner: Any) -> bool:
 
 
 def _places(data: Any) -> Any:
-    todo = [data]
+    todo = [data] if isinstance(data, dict | list) else []
     while todo:
         holder = todo.pop()
         keys = holder if isinstance(holder, dict) else range(len(holder))
@@ -116,10 +121,7 @@ def raw(data: bytes, rng: Random) -> bytes:
         elif action == 4 and found:
             found[at % len(found)] ^= 1 << rng.randrange(8)
         else:
-            found[at:at] = rng.choice(
-                (b"\x00", b"\xff\xfe", b"[" * 100_000, b'{"a":' * 50_000, b'"', b"NaN", b"\n", b"1e9999",
-                 b"9" * 5000, b"(" * 5000, b"\\ud800", "\u202e".encode(), b"#", b"'''", b"=", b")")
-            )  # fmt: skip
+            found[at:at] = rng.choice(PIECES)
     return bytes(found)
 
 

@@ -55,6 +55,7 @@ def test_damaged_json_is_one_sentence(text: str, says: str) -> None:
         ("a = " + "[" * 100 + "]" * 100, "more than 64 deep"),
         ("a = " + "[" * 100_000, "x.toml"),
         (".".join("a" * 100_000) + " = 1", "a key of more than 64 parts"),
+        ("a" * 300_000, "not valid TOML"),
         ("[" + ".".join("a" * 100) + "]", "a key of more than 64 parts"),
     ],
 )

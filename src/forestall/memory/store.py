@@ -365,6 +365,8 @@ class SqliteStore:
             yield
         except DamageError as error:
             raise MemoryFileError(f"memory {self.path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise MemoryFileError(f"memory {self.path} is damaged: {error}") from error
         except sqlite3.Error as error:
             text = str(error)
             if "lock" in text or "busy" in text:

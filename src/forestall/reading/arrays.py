@@ -22,6 +22,7 @@ from forestall.reading.files import decoding, read_bytes
 MOST_ARRAY_BYTES = 512 * 2**20
 MOST_ARRAYS = 4096
 MOST_DIMENSIONS = 8
+NUMBERS = "biufc"
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 _HOW = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
@@ -38,8 +39,12 @@ def read_npy(path: Path) -> npt.NDArray[Any]:
         return _array(io.BytesIO(data), len(data))
 
 
-def read_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
+def read_npz(path: Path, kinds: str = NUMBERS) -> dict[str, npt.NDArray[Any]]:
     """The arrays of an .npz file by name.
+
+    Args:
+        path: of the file.
+        kinds: of values, as numpy's `dtype.kind` names them; plain numbers by default.
 
     Raises:
         FileFormatError: no .npz, one of its arrays as in `read_npy`, or too much in all.
@@ -56,7 +61,7 @@ def read_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
             with archive.open(member) as file:
                 content = file.read(member.file_size + 1)
             with decoding(path, f"a numpy archive: array {name!r}"):
-                found[name] = _array(io.BytesIO(content), len(content))
+                found[name] = _array(io.BytesIO(content), len(content), kinds)
     return found
 
 
@@ -71,12 +76,12 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
             raise ValueError(f"{member.filename!r} is encrypted, or packed in an unknown way")
 
 
-def _array(file: IO[bytes], size: int) -> npt.NDArray[Any]:
+def _array(file: IO[bytes], size: int, kinds: str = NUMBERS) -> npt.NDArray[Any]:
     read_header = _HEADERS.get(npy.read_magic(file))
     if read_header is None:
         raise ValueError("a version of the format that numpy does not write for numbers")
     shape, fortran, dtype = read_header(file)
-    if dtype.hasobject or dtype.kind not in "biufc" or dtype.shape:
+    if dtype.hasobject or dtype.kind not in kinds or dtype.shape:
         raise ValueError(f"its values are {dtype}, not plain numbers")
     if len(shape) > MOST_DIMENSIONS or any(n < 0 for n in shape):
         raise ValueError(f"it has the shape {shape}")

@@ -45,7 +45,7 @@ class Box:
     high: Vec3
 
     def __post_init__(self) -> None:
-        if any(a > b for a, b in zip(self.low, self.high, strict=True)):
+        if not all(a <= b for a, b in zip(self.low, self.high, strict=True)):  # NaN is no order
             raise InputError(f"box corners are out of order: {self.low} > {self.high}")
 
     @property
