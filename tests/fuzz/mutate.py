@@ -51,8 +51,10 @@ def _changed(data: Any, rng: Random) -> Any:
     if not places or rng.random() < 0.02:
         return value(rng)
     holder, key = rng.choice(places)
-    action = rng.randrange(9)
-    if action <= 3:
+    action = rng.randrange(11)
+    if action >= 9:
+        holder[key] = _like(holder[key], rng)
+    elif action <= 3:
         holder[key] = value(rng)
     elif action == 4:
         del holder[key]
@@ -96,7 +98,7 @@ def _like(found: Any, rng: Random) -> Any:
     if isinstance(found, bool) or found is None:
         return not found
     if isinstance(found, int | float):
-        return rng.choice((found + 1, -found, found * 10, found * 1e6, 0, found - 1, float(found)))
+        return rng.choice((found + 1, -found, found * 10, found * 1000, 0, found - 1, found // 3))
     if isinstance(found, str):
         at = rng.randrange(len(found) + 1)
         return rng.choice((found[:at], found[at:], found + found, found.upper(), f" {found} "))
@@ -131,10 +133,11 @@ def json_text(data: Any) -> bytes:
 
 
 def toml_text(data: Any) -> bytes:
-    """TOML in its inline form; what is no TOML is written all the same."""
+    """TOML in its inline form; what is no TOML is written all the same, null is left out."""
     if not isinstance(data, dict):
         return _toml(data).encode()
-    return "\n".join(f"{_key(k)} = {_toml(v)}" for k, v in data.items()).encode()
+    told = (f"{_key(k)} = {_toml(v)}" for k, v in data.items() if v is not None)
+    return "\n".join(told).encode()
 
 
 def _key(text: Any) -> str:
@@ -143,9 +146,10 @@ def _key(text: Any) -> str:
 
 def _toml(found: Any) -> str:
     if isinstance(found, dict):
-        return "{" + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in found.items()) + "}"
+        told = (f"{_key(k)} = {_toml(v)}" for k, v in found.items() if v is not None)
+        return "{" + ", ".join(told) + "}"
     if isinstance(found, list | tuple):
-        return "[" + ", ".join(map(_toml, found)) + "]"
+        return "[" + ", ".join(_toml(v) for v in found if v is not None) + "]"
     if isinstance(found, float) and not math.isfinite(found):
         return {math.inf: "inf", -math.inf: "-inf"}.get(found, "nan")
     return json.dumps(found)

@@ -15,6 +15,7 @@ from forestall.experiments.folder import ResultsFolder, episodes_in
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
 from forestall.files import replace_file
+from forestall.kinds import CAPTIONER, IMAGE_ENCODER
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import CASE_SETS, cases
 from forestall.statistics.findings import findings
@@ -113,7 +114,8 @@ def _missing(
 def shown_names(settings: dict[str, Any]) -> dict[str, str]:
     """How detectors are called; offline stand-ins are called stand-ins."""
     parts = settings["parts"]
-    used = {"image": parts["image-encoder"]["name"], "caption": parts["captioner"]["name"]}
+    made_by = {"image": IMAGE_ENCODER.name, "caption": CAPTIONER.name}
+    used = {d: parts[kind]["name"] for d, kind in made_by.items() if kind in parts}
     return {d: STAND_INS[d, w] for d, w in used.items() if (d, w) in STAND_INS}
 
 
