@@ -147,17 +147,21 @@ def _odd(rng: Random) -> Any:
 
 
 def _made_odd(name: str, rng: Random) -> Observation:
-    seen = scene.with_masks(scene.observation())
+    seen: Any = scene.with_masks(scene.observation())
     if name == "frames":
-        return replace(seen, frames=rng.choice(((), None, (None,), seen.frames * 3, [seen.frames])))
+        several: Any = ((), None, (None,), seen.frames * 3, [seen.frames])
+        return _as_seen(replace(seen, frames=rng.choice(several)))
     if name == "gripper":
-        hand = rng.choice((None, "Plate-1", "", 7, "no-1", "Plate", mutate.value(rng)))
-        where = rng.choice((seen.gripper.position_world_m, (rng.choice(NUMBERS),) * 3, (), None))
-        return replace(seen, gripper=GripperState(hand, where, mutate.value(rng)))
+        hand: Any = rng.choice((None, "Plate-1", "", 7, "no-1", "Plate", mutate.value(rng)))
+        where: Any = rng.choice(
+            (seen.gripper.position_world_m, (rng.choice(NUMBERS),) * 3, (), None)
+        )
+        return _as_seen(replace(seen, gripper=GripperState(hand, where, mutate.value(rng))))
     if name == "time_s":
-        return replace(seen, time_s=rng.choice((*NUMBERS, mutate.value(rng))))
+        return _as_seen(replace(seen, time_s=rng.choice((*NUMBERS, mutate.value(rng)))))
     if name == "robot_position_world_m":
-        return replace(seen, robot_position_world_m=rng.choice(((rng.choice(NUMBERS),) * 3, (), 7)))
+        places: Any = ((rng.choice(NUMBERS),) * 3, (), 7)
+        return _as_seen(replace(seen, robot_position_world_m=rng.choice(places)))
     frame = {f.name: getattr(seen.frames[0], f.name) for f in fields(Frame)}
     if name == "mask":
         first, *others = frame["detections"]
@@ -168,11 +172,18 @@ def _made_odd(name: str, rng: Random) -> Observation:
         key = rng.choice(sorted(odd))
         frame["detections"] = (replace(first, **{key: odd[key]}), *frame["detections"][1:])
     elif name == "intrinsics":
-        numbers = [rng.choice((*NUMBERS, 80, 60, 39.5, -5, 10**6, None, "80")) for _ in range(6)]
+        numbers: Any = [
+            rng.choice((*NUMBERS, 80, 60, 39.5, -5, 10**6, None, "80")) for _ in range(6)
+        ]
         frame["intrinsics"] = Intrinsics(*numbers)
     else:
         frame[name] = _odd(rng)
-    return replace(seen, frames=(Frame(**frame),))
+    return _as_seen(replace(seen, frames=(Frame(**frame),)))
+
+
+def _as_seen(found: Any) -> Observation:
+    assert isinstance(found, Observation)
+    return found
 
 
 def judge(given: tuple[str, Callable[[], Observation], bool]) -> str | None:

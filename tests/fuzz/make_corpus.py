@@ -7,8 +7,6 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from domain.pddl_corpus import FOLDER as PDDL
-from domain.test_load_errors import GOOD
 from experiments.episodes import computed_row
 from forestall.experiments.conduct import Experiment, conduct
 from forestall.experiments.runs import Choice
@@ -23,6 +21,7 @@ from . import scene
 
 CORPUS = Path(__file__).parent / "corpus"
 SEEDS = Path(__file__).parent / "seeds"
+PDDL = Path(__file__).parents[1] / "domain" / "pddl"
 
 
 def main() -> None:
@@ -92,8 +91,7 @@ def observations() -> None:
 
 def texts() -> None:
     """Task, scenario, domain and configuration files."""
-    (folder("domain") / "bench.toml").write_text(GOOD)
-    for name in ("task", "scenario", "config"):
+    for name in ("task", "scenario", "config", "domain"):
         shutil.copy(SEEDS / f"{name}.toml", folder(name))
     for stem in ("ferry", "coffee"):
         for file in PDDL.glob(f"{stem}.*pddl"):

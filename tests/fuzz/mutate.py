@@ -17,7 +17,7 @@ TEXTS = (
     "pick_up(Plate)", "held_by(Plate-1, gripper)", "true", "\n[skills.x]\n",
 )  # fmt: skip
 
-VALUES = (
+VALUES: tuple[Any, ...] = (
     None, True, False, 0, 1, -1, 3, 255, 2**31, 2**53, 2**63 - 1, 2**63, 2**64, -(2**63), 10**400,
     0.5, -0.0, 1e-320, 1e-30, 1e30, 1e300, -1e300, math.nan, math.inf, -math.inf, [], {}, [[]],
     [None], {"": None}, {"a": {"b": []}}, [0, 0, 0], [1, 2], ["a", "b", "c"], [[0] * 4] * 4,

@@ -15,7 +15,7 @@ import tomllib
 import zipfile
 import zlib
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from . import live, mutate
+from . import live, mutate, scene
 from .make_corpus import CORPUS
 
 
@@ -42,7 +42,10 @@ def _one(name: str, rng: Random) -> Path:
 
 def _copied(source: Path, folder: Path) -> Path:
     target = folder / source.name
-    return shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
+    if source.is_dir():
+        return shutil.copytree(source, target)
+    shutil.copy(source, target)
+    return target
 
 
 def _document(name: str, write: Callable[[Any], bytes], load: Callable[[str], Any]) -> Any:
@@ -165,7 +168,7 @@ def _damage_content(file: sqlite3.Connection, rng: Random) -> None:
     steps = file.execute(
         "SELECT number, subtask, graph, whole, image FROM steps WHERE demonstration = ?", head[:1]
     ).fetchall()
-    fields = list(head[1:])
+    fields: Any = list(head[1:])
     which = rng.choice(("things", "things", "graph", "whole", "subtask", "perception"))
     if which == "things":
         fields[5] = _packed(fields[5], rng)
@@ -177,7 +180,8 @@ def _damage_content(file: sqlite3.Connection, rng: Random) -> None:
         step[at] = rng.choice(mutate.TEXTS[6:]) if at == 1 else _packed(step[at], rng)
         step[1] = step[1].encode("utf-8", "replace").decode()
         steps[0] = tuple(step)
-    encoded = Encoded(*fields, tuple(EncodedStep(*s) for s in steps))
+    packed = tuple(EncodedStep(*s) for s in steps)
+    encoded = Encoded(*fields[:5], things=fields[5], steps=packed)
     file.execute(
         "UPDATE demonstrations SET perception = ?, things = ?, digest = ? WHERE id = ?",
         (fields[4], fields[5], encoded.digest, head[0]),
@@ -279,11 +283,10 @@ def _pddl(folder: Path, rng: Random) -> Path:
 
 
 def _read_graph(path: Path) -> None:
-    from forestall.cli.inspect import read_graph
+    from forestall.assembly.stored import read_graph, read_scene
     from forestall.comparison.score import ScoreConfig, compare
     from forestall.embeddings.hashed import HashedTextEncoder
-
-    from . import scene
+    from forestall.errors import FileFormatError
 
     known = read_graph(CORPUS / "graph" / "plain.json")
     found = read_graph(path)
@@ -292,6 +295,8 @@ def _read_graph(path: Path) -> None:
     encoder = HashedTextEncoder()
     compare(found, known, ScoreConfig(), encoder, scene.domain())
     compare(known, found, ScoreConfig(), encoder, scene.domain())
+    with suppress(FileFormatError):  # what the domain does not know can be compared all the same
+        read_scene(path, scene.domain())
 
 
 def _read_demonstration(path: Path) -> str | None:
@@ -334,8 +339,6 @@ def _read_results(path: Path) -> None:
 
 def _read_observation(path: Path) -> None:
     from forestall.perception.folder import read_observation
-
-    from . import scene
 
     observation, _ = read_observation(path, scene.domain())
     seer = scene.perceiver()

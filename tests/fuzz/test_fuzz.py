@@ -7,7 +7,6 @@ from random import Random
 
 import pytest
 
-from . import run
 from .make_corpus import CORPUS
 from .readers import READERS, Reader
 from .run import GOOD, HANG, READ, TRACEBACK, Case, run_all, run_case
@@ -24,7 +23,7 @@ OF_FILES = {
     "results": ("results/all",),
     "task": ("task/task.toml",),
     "scenario": ("scenario/scenario.toml",),
-    "domain": ("domain/bench.toml",),
+    "domain": ("domain/domain.toml",),
     "config": ("config/config.toml",),
     "pddl": ("pddl/coffee.pddl", "pddl/ferry.pddl"),
 }
@@ -65,7 +64,7 @@ def test_what_raises_and_what_hangs_is_counted_as_such(monkeypatch: pytest.Monke
             pass
         return None
 
-    monkeypatch.setitem(run.READERS, "graph", Reader(lambda _, rng: rng.randrange(99), read))
+    monkeypatch.setitem(READERS, "graph", Reader(lambda _, rng: rng.randrange(99), read))
     seeds = {Random(f"1/graph/{k}").randrange(99) % 3: k for k in range(20)}
     cases = [Case("graph", 1, seeds[what]) for what in (0, 1, 2)]
     found = {r.case: r.outcome for r in run_all(cases, 2, limit_s=1.0)}

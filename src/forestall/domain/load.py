@@ -302,7 +302,7 @@ def _category(name: str, table: Any, domain: Domain, base: Category | None) -> C
         check_text(f"{label}: words", table["words"])
     synonyms = texts(f"{label}: synonyms", table.get("synonyms", ()))
     extra: dict[str, Any] = dict(as_table(f"{label}: world", table.get("world", {})))
-    extra |= {f"#{p}": tuple(table[p]) for p in statics if p in table}
+    extra |= {f"#{p}": _names(label, p, table) for p in statics if p in table}
     old = base or Category(name)
     return Category(
         name,

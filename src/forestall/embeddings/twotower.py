@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -94,13 +94,13 @@ class Description:
 
 
 def _reading(field: Field) -> StateReading:
-    numbers = {
-        key: dict(field[key].pairs(Field.number))
+    temperature, threshold = (
+        dict(field.optional(key, lambda f: f.pairs(Field.number)) or ())
         for key in ("temperature", "threshold")
-        if field.find(key) is not None
-    }
-    least = {} if field.find("least_area") is None else {"least_area": field["least_area"].whole()}
-    return StateReading(scale=field["scale"].number(), **numbers, **least)
+    )
+    found = StateReading(field["scale"].number(), temperature, threshold)
+    least_area = field.optional("least_area", Field.whole)
+    return found if least_area is None else replace(found, least_area=least_area)
 
 
 def checksums(folder: Path) -> dict[str, str]:

@@ -6,6 +6,7 @@ import struct
 import zipfile
 import zlib
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -67,8 +68,8 @@ def test_a_picture_beyond_its_budget_is_refused(
 
 @pytest.mark.parametrize("order", ["C", "F"])
 @pytest.mark.parametrize("kind", ["<f4", ">f8", "?", "u2"])
-def test_arrays_come_back(tmp_path: Path, kind: str, order: str) -> None:
-    array = np.arange(6).reshape(2, 3).astype(kind, order=order)
+def test_arrays_come_back(tmp_path: Path, kind: str, order: Literal["C", "F"]) -> None:
+    array = np.array(np.arange(6).reshape(2, 3), dtype=kind, order=order)
     np.save(tmp_path / "a.npy", array)
     read = read_npy(tmp_path / "a.npy")
     assert np.array_equal(read, array) and read.dtype.isnative and read.flags.writeable
