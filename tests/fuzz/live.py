@@ -59,8 +59,9 @@ def _without(frame: dict[str, Any], rng: Random) -> None:
 
 
 def _shifted(frame: dict[str, Any], rng: Random) -> None:
+    by, axis = rng.choice((-20, -15, 15, 20)), rng.choice((0, 1))
     frame["detections"] = tuple(
-        replace(d, mask=np.roll(d.mask, 30, axis=1)) for d in frame["detections"]
+        replace(d, mask=np.roll(d.mask, by, axis=axis)) for d in frame["detections"]
     )
 
 
@@ -97,6 +98,11 @@ BROKEN: dict[str, Change] = {
     "pose of NaN": _pose(np.full((4, 4), np.nan)),
     "mirrored pose": _pose(lambda p: p @ np.diag([-1.0, 1.0, 1.0, 1.0])),
     "masks shifted": _shifted,
+    "masks upside down": lambda f, rng: f.update(
+        detections=tuple(
+            replace(d, mask=np.ascontiguousarray(d.mask[::-1])) for d in f["detections"]
+        )
+    ),
     "every confidence zero": _unsure,
 }
 """Damage after which nothing may be believed."""
@@ -114,9 +120,10 @@ KINDS = (
     "U3",
     "O",
 )
+_SIZE = (scene.ROWS, scene.COLUMNS)
 SHAPES: tuple[tuple[int, ...], ...] = (
-    (), (0,), (1,), (60, 80), (80, 60), (60, 80, 3), (60, 80, 4), (60, 80, 1), (4, 4), (3, 4),
-    (0, 0), (0, 0, 3), (2, 60, 80),
+    (), (0,), (1,), _SIZE, _SIZE[::-1], (*_SIZE, 3), (*_SIZE, 4), (*_SIZE, 1), (4, 4), (3, 4),
+    (0, 0), (0, 0, 3), (2, *_SIZE),
 )  # fmt: skip
 
 

@@ -181,7 +181,8 @@ def _damage_content(file: sqlite3.Connection, rng: Random) -> None:
         step[1] = step[1].encode("utf-8", "replace").decode()
         steps[0] = tuple(step)
     packed = tuple(EncodedStep(*s) for s in steps)
-    encoded = Encoded(*fields[:5], things=fields[5], steps=packed)
+    task, place, seed, version, perception, things = fields
+    encoded = Encoded(task, place, seed, version, perception, things, packed)
     file.execute(
         "UPDATE demonstrations SET perception = ?, things = ?, digest = ? WHERE id = ?",
         (fields[4], fields[5], encoded.digest, head[0]),
@@ -202,25 +203,25 @@ def _packed(blob: bytes, rng: Random) -> bytes:
 
 _HEADS = (
     "{'descr': '<f4', 'fortran_order': False, 'shape': (1000000, 1000000)}",
-    "{'descr': '|O', 'fortran_order': False, 'shape': (60, 80)}",
-    "{'descr': '<f4', 'fortran_order': False, 'shape': (-60, 80)}",
-    "{'descr': '<f4', 'fortran_order': False, 'shape': (4800,)}",
-    "{'descr': '>f8', 'fortran_order': True, 'shape': (60, 80)}",
-    "{'descr': '<c8', 'fortran_order': False, 'shape': (60, 80)}",
-    "{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (60, 80)}",
-    "{'descr': '<M8[s]', 'fortran_order': False, 'shape': (60, 80)}",
+    "{'descr': '|O', 'fortran_order': False, 'shape': (90, 120)}",
+    "{'descr': '<f4', 'fortran_order': False, 'shape': (-90, 120)}",
+    "{'descr': '<f4', 'fortran_order': False, 'shape': (10800,)}",
+    "{'descr': '>f8', 'fortran_order': True, 'shape': (90, 120)}",
+    "{'descr': '<c8', 'fortran_order': False, 'shape': (90, 120)}",
+    "{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (90, 120)}",
+    "{'descr': '<M8[s]', 'fortran_order': False, 'shape': (90, 120)}",
     "(" * 100,
 )
 
 
 def _npy(rng: Random) -> bytes:
     head = rng.choice(_HEADS).encode().ljust(117) + b"\n"
-    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + bytes(60 * 80 * 4)
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + bytes(90 * 120 * 4)
 
 
 def _array(rng: Random) -> np.ndarray[Any, Any]:
     kind = rng.choice(("f4", "f8", "i8", "u2", "?", "c8", "U3"))
-    shape = rng.choice(((60, 80), (80, 60), (60, 80, 3), (4800,), (0, 0), (1, 1), ()))
+    shape = rng.choice(((90, 120), (120, 90), (90, 120, 3), (10800,), (0, 0), (1, 1), ()))
     fill = rng.choice((0, 1, 2, 1e30, -1, np.nan, np.inf)) if kind[0] in "fc" else 1
     return np.full(shape, fill, dtype=kind)
 
@@ -248,7 +249,7 @@ def _observation(folder: Path, rng: Random) -> Path:
                 out.writestr(name, rng.choice((buffer.getvalue(), _npy(rng), b"")))
     else:
         mode = rng.choice(("L", "RGB", "RGBA", "1", "P", "I;16", "F", "LA", "CMYK"))
-        size = rng.choice(((80, 60), (60, 80), (1, 1), (4000, 3000)))
+        size = rng.choice(((120, 90), (90, 120), (1, 1), (4000, 3000)))
         kind = {"F": "TIFF", "CMYK": "JPEG"}.get(mode, rng.choice(("PNG", "GIF")))
         image = Image.new(mode, size, rng.choice((0, 1)))
         (image if kind != "GIF" or mode == "L" else image.convert("L")).save(file, kind)

@@ -17,20 +17,25 @@ from forestall.types.observation import Intrinsics, Observation
 from forestall.types.plan import Plan, Subtask
 from perception.synthetic import Solid, at, looking, observed
 
-CAMERA = Intrinsics.from_vertical_fov(80, 60, 60.0)
+ROWS, COLUMNS = 90, 120
+CAMERA = Intrinsics.from_vertical_fov(COLUMNS, ROWS, 60.0)
 EYE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
 GRASP = Subtask.parse("pick_up(Plate)")
 ARGUMENT = "Plate-1"
-MUG = (0.085, 0.085, 0.10)
 
 
 def observation(shift: float = 0.0) -> Observation:
-    """A counter with a plate and a mug."""
-    solids = [
-        Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9)),
-        at(ARGUMENT, 0.1 + shift, 0.3, 0.9, (0.22, 0.22, 0.02), True),
-        at("Mug-1", -0.3 + shift, 0.3, 0.9, MUG, True),
-    ]
+    """A counter with a plate among other things."""
+    things: dict[str, tuple[float, float, tuple[float, float, float]]] = {
+        ARGUMENT: (0.1, 0.3, (0.22, 0.22, 0.02)),
+        "Mug-1": (-0.3, 0.3, (0.085, 0.085, 0.10)),
+        "Pot-1": (0.4, 0.4, (0.2, 0.2, 0.13)),
+        "WineBottle-1": (-0.5, 0.45, (0.08, 0.08, 0.29)),
+        "Bread-1": (-0.1, 0.15, (0.24, 0.11, 0.11)),
+        "Bowl-1": (0.55, 0.12, (0.18, 0.18, 0.08)),
+    }
+    solids = [Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))]
+    solids += [at(n, x + shift, y, 0.9, size, True) for n, (x, y, size) in things.items()]
     return observed(solids, EYE, camera=CAMERA)
 
 
