@@ -7,6 +7,10 @@ from random import Random
 
 import pytest
 
+from forestall.types.decision import Outcome
+from stranger import scene as stranger_scene
+
+from . import live, scene
 from .make_corpus import CORPUS
 from .readers import READERS, Reader
 from .run import GOOD, HANG, READ, TRACEBACK, Case, run_all, run_case
@@ -38,6 +42,12 @@ def test_the_corpus_is_read_before_it_is_damaged(name: str, tmp_path: Path) -> N
         shutil.copytree(source if source.is_dir() else source.parent, tmp_path, dirs_exist_ok=True)
         target = tmp_path if source.is_dir() else tmp_path / source.name
         assert READERS[name].read(target) is None
+
+
+def test_what_is_not_damaged_may_proceed() -> None:
+    decision = scene.monitor().before(scene.with_masks(scene.observation()))
+    assert decision.outcome is Outcome.PROCEED
+    assert live.check(stranger_scene()) is None
 
 
 @pytest.mark.parametrize("name", sorted(READERS))
