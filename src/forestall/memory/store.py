@@ -285,7 +285,8 @@ class SqliteStore:
                     f"memory {self.path} has schema version {version}, this version of forestall "
                     f"reads {SCHEMA_VERSION}: record it again with 'forestall demos record'"
                 )
-            if self._schema() != _own_schema():
+            least, most = _own_schemas()
+            if not least <= self._schema() <= most:
                 raise MemoryFileError(
                     f"memory {self.path} is damaged: its tables are not those of a memory"
                 )
@@ -394,10 +395,13 @@ def _schema_of(connection: sqlite3.Connection) -> set[tuple[str, ...]]:
 
 
 @cache
-def _own_schema() -> frozenset[tuple[str, ...]]:
+def _own_schemas() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[str, ...]]]:
+    """What every memory has, and what one has that keeps what was recorded for what."""
     with closing(sqlite3.connect(":memory:")) as empty:
         empty.executescript(_SCHEMA)
-        return frozenset(_schema_of(empty))
+        least = frozenset(_schema_of(empty))
+        empty.execute(_RECORDINGS)
+        return least, frozenset(_schema_of(empty))
 
 
 @contextmanager
