@@ -15,15 +15,15 @@ import os
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from types import TracebackType
 
 from forestall.errors import MemoryFileError
 from forestall.memory.codec import DamageError, Encoded, EncodedStep, decode, encode
 from forestall.memory.images import ImageFolder
+from forestall.memory.schema import RECORDINGS, SCHEMA, own_schemas, schema_of
 from forestall.reading.files import MOST_BYTES
 from forestall.types.demonstration import Demonstration
 from forestall.types.observation import Rgb
@@ -32,39 +32,6 @@ APPLICATION_ID = 0x464F5245
 """Marks the file as a memory of forestall ("FORE")."""
 
 SCHEMA_VERSION = 1
-
-_SCHEMA = """
-CREATE TABLE demonstrations (
-    id TEXT PRIMARY KEY,
-    task TEXT NOT NULL,
-    scene TEXT NOT NULL,
-    seed INTEGER NOT NULL,
-    version TEXT NOT NULL,
-    perception TEXT NOT NULL,
-    things BLOB NOT NULL,
-    digest TEXT NOT NULL,
-    recorded_at TEXT NOT NULL
-) STRICT;
-CREATE TABLE steps (
-    demonstration TEXT NOT NULL REFERENCES demonstrations(id) ON DELETE CASCADE,
-    position INTEGER NOT NULL,
-    number INTEGER NOT NULL,
-    subtask TEXT NOT NULL,
-    graph BLOB NOT NULL,
-    whole BLOB NOT NULL,
-    image TEXT,
-    PRIMARY KEY (demonstration, position)
-) STRICT, WITHOUT ROWID;
-CREATE INDEX demonstrations_by_task ON demonstrations(task);
-"""
-
-_RECORDINGS = """
-CREATE TABLE IF NOT EXISTS recordings (
-    job TEXT PRIMARY KEY,
-    demonstration TEXT NOT NULL REFERENCES demonstrations(id) ON DELETE CASCADE
-) STRICT
-"""
-"""What was recorded for what; made with the first, so that a memory without it is read as well."""
 
 _MAGIC = b"SQLite format 3\x00"
 
@@ -163,7 +130,7 @@ class SqliteStore:
             if old is None:
                 self._insert(name, digest, encoded)
             if job is not None:
-                self._connection.execute(_RECORDINGS)
+                self._connection.execute(RECORDINGS)
                 self._connection.execute(
                     "INSERT OR REPLACE INTO recordings VALUES (?, ?)", (job, name)
                 )
@@ -285,7 +252,7 @@ class SqliteStore:
                     f"memory {self.path} has schema version {version}, this version of forestall "
                     f"reads {SCHEMA_VERSION}: record it again with 'forestall demos record'"
                 )
-            least, most = _own_schemas()
+            least, most = own_schemas()
             if not least <= self._schema() <= most:
                 raise MemoryFileError(
                     f"memory {self.path} is damaged: its tables are not those of a memory"
@@ -317,10 +284,10 @@ class SqliteStore:
         return int(self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
 
     def _schema(self) -> set[tuple[str, ...]]:
-        return _schema_of(self._connection)
+        return schema_of(self._connection)
 
     def _make(self) -> None:
-        for statement in _SCHEMA.strip().removesuffix(";").split(";\n"):
+        for statement in SCHEMA.strip().removesuffix(";").split(";\n"):
             self._connection.execute(statement)
         self._connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         self._connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
@@ -384,24 +351,6 @@ class SqliteStore:
                     f"memory {self.path} cannot be read or written: {text}: is the disk full?"
                 ) from error
             raise MemoryFileError(f"memory {self.path} is damaged: {text}") from error
-
-
-def _schema_of(connection: sqlite3.Connection) -> set[tuple[str, ...]]:
-    """Tables, indexes, views and triggers, each with what made it."""
-    rows = connection.execute(
-        "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite\\_%' ESCAPE '\\'"
-    )
-    return {tuple(map(str, row)) for row in rows}
-
-
-@cache
-def _own_schemas() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[str, ...]]]:
-    """What every memory has, and what one has that keeps what was recorded for what."""
-    with closing(sqlite3.connect(":memory:")) as empty:
-        empty.executescript(_SCHEMA)
-        least = frozenset(_schema_of(empty))
-        empty.execute(_RECORDINGS)
-        return least, frozenset(_schema_of(empty))
 
 
 @contextmanager
