@@ -146,12 +146,12 @@ JSON_FAULTS = {
     "missing mask file": (
         lambda d: (detection(d).pop("id"), detection(d).update(mask="no.png")),
         FileFormatError,
-        "no.png is missing",
+        "no.png: No such file",
     ),
     "missing picture": (
         lambda d: d["frames"][0].update(rgb="no.png"),
         FileFormatError,
-        "no.png is missing",
+        "no.png: No such file",
     ),
     "no matrix": (
         lambda d: d["frames"][0].update(camera_to_world=[[2, 0, 0, 0]] * 4),
@@ -417,8 +417,8 @@ BAD_MASKS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], dict[str, Any], s
     "minus one": (lambda m: np.where(m, 1, -1), {}, "mask_kind"),
     "nan": (lambda m: np.where(m, 1.0, np.nan), {}, "NaN"),
     "3-D": (lambda m: m[None], {}, "shape"),
-    "objects": (lambda m: np.array([m, None], dtype=object), {}, "not Python objects"),
-    "texts": (lambda m: m.astype(str), {}, "bool or numbers"),
+    "objects": (lambda m: np.array([m, None], dtype=object), {}, "not plain numbers"),
+    "texts": (lambda m: m.astype(str), {}, "not plain numbers"),
 }
 
 
@@ -428,7 +428,8 @@ def test_masks_that_say_nothing_sure_are_refused(folder: Path, kind: str) -> Non
     as_npz(folder, make, **declared)
     with pytest.raises(FileFormatError, match=text) as error:
         read_observation(folder)
-    assert "masks.npz" in str(error.value) and "detections.0" in str(error.value)
+    place = "array 'm1'" if kind in ("objects", "texts") else "detections.0"
+    assert "masks.npz" in str(error.value) and place in str(error.value)
 
 
 def one_each(folder: Path, make: Callable[[np.ndarray], Image.Image], **declared: object) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 from PIL import Image
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
@@ -34,6 +34,9 @@ from forestall.perception.conventions import (
 from forestall.perception.folder_files import MaskFile, read_depth, read_rgb, single_mask
 from forestall.perception.gate import inspect
 from forestall.perception.gate_config import GateConfig
+from forestall.reading.documents import read_json
+from forestall.reading.files import inside
+from forestall.reading.models import validated
 from forestall.types.facts import category_of
 from forestall.types.finding import refuse
 from forestall.types.observation import (
@@ -175,20 +178,12 @@ def _document(folder: Path) -> _Document:
         raise FileFormatError(f"{folder} is not a folder: give the one with {OBSERVATION_FILE}")
     if not file.is_file():
         raise FileFormatError(f"{file} is missing: a stored observation begins with it")
-    try:
-        data = json.loads(file.read_text(encoding="utf-8-sig"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file} is not JSON: {error}") from error
+    data = read_json(file, "stored observation")
     if isinstance(data, dict) and data.get("format") != OBSERVATION_FORMAT:
         raise FileFormatError(
             f"{file}: format {data.get('format')!r}: this version reads {OBSERVATION_FORMAT}"
         )
-    try:
-        return _Document.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the document"
-        raise FileFormatError(f"{file}: {where}: {first['msg']}") from error
+    return validated(_Document, data, str(file))
 
 
 class _Reading:
@@ -216,7 +211,7 @@ class _Reading:
         """One frame with its pictures, as ours."""
         folder, place = self._folder, f"frames.{index}"
         how = data.over(self._document)
-        rgb = read_rgb(folder / data.rgb)
+        rgb = read_rgb(inside(folder, data.rgb))
         height, width = rgb.shape[:2]
         k = data.intrinsics
         camera = Intrinsics(width, height, k.fx, k.fy, k.cx, k.cy)
@@ -312,7 +307,7 @@ def _mask(
         )
     kind = None if how.mask_kind == "ids" else how.mask_kind
     if given.mask is not None and given.mask.endswith(".png"):
-        mask = single_mask(folder / given.mask, shape, kind, how.mask_threshold)
+        mask = single_mask(inside(folder, given.mask), shape, kind, how.mask_threshold)
     elif masks is None:
         raise FileFormatError(f"{where}: there is no masks.png and no masks.npz in {folder}")
     else:

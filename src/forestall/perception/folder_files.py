@@ -5,48 +5,28 @@ Units and kinds are as declared; `conventions.py` converts them.
 
 from __future__ import annotations
 
-import io
-import zipfile
-import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 from forestall.errors import FileFormatError, InputError
 from forestall.perception.conventions import MaskKind, mask_of
+from forestall.reading.arrays import read_npy, read_npz
+from forestall.reading.files import inside
+from forestall.reading.pictures import read_picture
 from forestall.types.observation import Mask, Rgb
 
 _GREY = ("I;16", "I;16B", "I;16L", "I")
 _OPAQUE = 255
 
 
-def _image(file: Path) -> Image.Image:
-    if not file.is_file():
-        raise FileFormatError(f"{file} is missing")
-    try:
-        image = Image.open(file)
-        image.load()
-    except (OSError, SyntaxError, ValueError) as error:
-        raise FileFormatError(f"{file} cannot be read as a picture: {error}") from error
-    return image
-
-
-def _array(file: Path) -> Any:
-    if not file.is_file():
-        raise FileFormatError(f"{file} is missing")
-    try:
-        return np.load(io.BytesIO(file.read_bytes()), allow_pickle=False)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise FileFormatError(f"{file} cannot be read as a numpy file: {error}") from error
-
-
 def read_rgb(file: Path) -> Rgb:
     """(H, W, 3) uint8."""
-    return np.asarray(_image(file).convert("RGB"), dtype=np.uint8)
+    return np.asarray(read_picture(file, "RGB"), dtype=np.uint8)
 
 
 def read_depth(folder: Path, name: str | None) -> tuple[npt.NDArray[Any], str | None, Path]:
@@ -61,18 +41,17 @@ def read_depth(folder: Path, name: str | None) -> tuple[npt.NDArray[Any], str | 
         if not options:
             raise FileFormatError(f"{folder} has neither depth.npy nor depth.png")
         name = options[0]
-    file = folder / name
+    file = inside(folder, name)
     if file.suffix != ".npy":
-        image = _image(file)
+        image = read_picture(file)
         if image.mode not in _GREY:
             raise FileFormatError(
                 f"{file}: depth as PNG must be 16-bit grey, this is {image.mode!r}"
             )
         return np.asarray(image), "mm", file
-    array = _array(file)
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        kind = getattr(array, "dtype", type(array).__name__)
-        raise FileFormatError(f"{file}: depth must be numbers, this is {kind}")
+    array = read_npy(file)
+    if array.dtype.kind not in "fiu":
+        raise FileFormatError(f"{file}: depth must be numbers, this is {array.dtype}")
     return array, "m" if array.dtype.kind == "f" else None, file
 
 
@@ -83,7 +62,7 @@ def single_mask(
 
     The alpha channel where there is one that says something; else grey; else what is not black.
     """
-    image = _image(file)
+    image = read_picture(file)
     if image.mode in ("RGBA", "LA", "PA"):
         alpha = np.asarray(image.convert("RGBA"))[:, :, 3]
         if kind == "alpha" or int(alpha.min()) < _OPAQUE:
@@ -111,15 +90,12 @@ def _mask(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaskFile:
-    """One id a pixel (masks.png, a TIFF or .npy of whole numbers), or masks.npz, one array a name.
-
-    Arrays of an .npz are read one by one when they are asked for.
-    """
+    """One id a pixel (a picture, or .npy of whole numbers), or an .npz with one array a name."""
 
     file: Path
     shape: tuple[int, ...]
     ids: npt.NDArray[np.int64] | None
-    arrays: Any = None
+    arrays: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
 
     @classmethod
     def open(cls, folder: Path, name: str | None, shape: tuple[int, ...]) -> MaskFile | None:
@@ -129,18 +105,15 @@ class MaskFile:
             if not options:
                 return None
             name = options[0]
-        file = folder / name
+        file = inside(folder, name)
         if file.suffix == ".npz":
-            loaded = _array(file)
-            if not hasattr(loaded, "files"):
-                raise FileFormatError(f"{file} is no .npz archive")
-            return cls(file, tuple(shape), None, loaded)
+            return cls(file, tuple(shape), None, read_npz(file))
         if file.suffix == ".npy":
-            raw = _array(file)
+            raw = read_npy(file)
             if raw.dtype.kind not in "iu":
                 raise FileFormatError(f"{file}: ids must be whole numbers, this is {raw.dtype}")
         else:
-            image = _image(file)
+            image = read_picture(file)
             if image.mode not in ("L", "P", *_GREY):
                 raise FileFormatError(
                     f"{file}: ids must be one number a pixel, this is a picture of mode "
@@ -170,14 +143,7 @@ class MaskFile:
             return mask
         if self.ids is not None:
             raise FileFormatError(f"{where}: 'mask' needs masks.npz, there is {self.file.name}")
-        if key not in self.arrays.files:
-            known = ", ".join(sorted(self.arrays.files)[:8]) or "none"
+        if key not in self.arrays:
+            known = ", ".join(sorted(self.arrays)[:8]) or "none"
             raise FileFormatError(f"{where}: {self.file} has no array {key!r}; it has {known}")
-        try:
-            raw = self.arrays[key]
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
-            raise FileFormatError(
-                f"{where}: {self.file}: {key} cannot be read ({error}): save bool or numbers, "
-                "not Python objects"
-            ) from error
-        return _mask(raw, self.shape, f"{where}: {self.file}", kind, threshold)
+        return _mask(self.arrays[key], self.shape, f"{where}: {self.file}", kind, threshold)

@@ -18,7 +18,7 @@ MOST_PICTURE_BYTES = 256 * 2**20
 MOST_PIXELS = 50_000_000
 """More than any camera of a robot has; a file of a few KiB can claim far more."""
 
-FORMATS = ("PNG", "JPEG", "WEBP", "BMP")
+FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
 
 
 def read_picture(path: Path, mode: str | None = None) -> Image.Image:

@@ -12,6 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import PerceptionError
+from forestall.types.checks import (
+    check_array,
+    check_edge,
+    check_name,
+    check_number,
+    check_point,
+    check_several,
+)
 from forestall.types.facts import GRIPPER
 
 if TYPE_CHECKING:
@@ -34,6 +42,12 @@ class Intrinsics:
     fy: float
     cx: float
     cy: float
+
+    def __post_init__(self) -> None:
+        check_edge("the width of a picture", self.width)
+        check_edge("the height of a picture", self.height)
+        for name in ("fx", "fy", "cx", "cy"):
+            check_number(name, getattr(self, name))
 
     @classmethod
     def from_vertical_fov(cls, width: int, height: int, fov_deg: float) -> Intrinsics:
@@ -58,6 +72,15 @@ class Detection:
     score: float = 1.0
     outlined: bool = True
     states: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        check_name("the category of a detection", self.category)
+        if self.instance is not None:
+            check_name("the instance of a detection", self.instance)
+        check_array("a mask", self.mask, "biuf")
+        check_number("the score of a detection", self.score)
+        if not 0 <= self.score <= 1:
+            raise PerceptionError(f"the score of a detection is 0 to 1, got {self.score}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +114,7 @@ class Frame:
     colour_only: bool = False
 
     def __post_init__(self) -> None:
+        self._check_types()
         size = (self.intrinsics.height, self.intrinsics.width)
         if self.rgb.shape != (*size, 3) or self.rgb.dtype != np.uint8:
             raise PerceptionError(
@@ -127,6 +151,18 @@ class Frame:
                     f"got {d.mask.shape} {d.mask.dtype}"
                 )
 
+    def _check_types(self) -> None:
+        if not isinstance(self.intrinsics, Intrinsics):
+            raise PerceptionError("intrinsics must be Intrinsics")
+        check_array("rgb", self.rgb, "biuf")
+        check_array("depth_m", self.depth_m, "biuf")
+        check_array("camera_to_world", self.camera_to_world, "iuf")
+        if self.detections is not None:
+            check_several("detections", self.detections, Detection)
+        check_several("instance_names", self.instance_names, str)
+        if self.instance_ids is not None:
+            check_array("instance_ids", self.instance_ids, "iu")
+
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
@@ -145,6 +181,15 @@ class GripperState:
     released_world_m: Vec3 | None = None
     name: str = GRIPPER
     told: bool = True
+
+    def __post_init__(self) -> None:
+        for what, name in (("holding", self.holding), ("released", self.released)):
+            if name is not None:
+                check_name(what, name)
+        check_name("the name of a hand", self.name)
+        check_point("the position of the hand", self.position_world_m)
+        if self.released_world_m is not None:
+            check_point("where the hand let go", self.released_world_m)
 
     @classmethod
     def untold(cls) -> GripperState:
@@ -176,6 +221,10 @@ class Observation:
     others: tuple[GripperState, ...] = ()
 
     def __post_init__(self) -> None:
+        check_several("frames", self.frames, Frame)
+        check_several("hands", (self.gripper, *self.others), GripperState)
+        check_number("time_s", self.time_s)
+        check_point("robot_position_world_m", self.robot_position_world_m)
         if not self.frames and self.graph is None:
             raise PerceptionError("an observation needs at least one frame, or a scene graph")
         names = [hand.name for hand in self.hands]
