@@ -50,11 +50,7 @@ def test_what_is_not_damaged_may_proceed() -> None:
     assert live.check(stranger_scene()) is None
 
 
-GATED = ("observation", "seen")
-"""What an input gate has to look at before anything of it is believed."""
-
-
-@pytest.mark.parametrize("name", sorted(set(READERS) - set(GATED)))
+@pytest.mark.parametrize("name", sorted(READERS))
 def test_whatever_is_read_is_read_or_refused_in_one_sentence(name: str) -> None:
     wrong = [r for k in range(FEW) if (r := run_case(Case(name, SEED, k))).outcome not in GOOD]
     assert wrong == []
