@@ -143,7 +143,7 @@ class MaskFile:
             return mask
         if self.ids is not None:
             raise FileFormatError(f"{where}: 'mask' needs masks.npz, there is {self.file.name}")
-        if key not in self.arrays:
+        if key is None or key not in self.arrays:
             known = ", ".join(sorted(self.arrays)[:8]) or "none"
             raise FileFormatError(f"{where}: {self.file} has no array {key!r}; it has {known}")
         return _mask(self.arrays[key], self.shape, f"{where}: {self.file}", kind, threshold)
