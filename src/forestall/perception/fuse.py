@@ -17,7 +17,7 @@ from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.relations import directions
-from forestall.perception.sightings import gather, in_hand, placing, readings
+from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
 from forestall.perception.support import Parent, parents
 from forestall.perception.tracks import (
     Fate,
@@ -97,7 +97,21 @@ class SceneMemory:
             track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
                 track.feature = sighting.feature or track.feature
+        self._take_note(views, time_s)
         return set(shown)
+
+    def _take_note(self, views: Sequence[View], time_s: float) -> None:
+        """Things that are seen and have no place: their names and states are known, no more."""
+        for track in self.tracks.values():
+            track.vague = track.vague and track.points_world_m is None
+        for name, (view, label) in sorted(unlocated(views).items()):
+            track = self.tracks.setdefault(
+                name, Track(name, view.categories[label], first_seen_s=time_s)
+            )
+            track.vague = track.points_world_m is None
+            track.pixels = int(np.count_nonzero(view.labels == label))
+            track.last_seen_s = time_s
+            track.states.update((a, v) for a, v in view.states[label].items() if v is not None)
 
     def _riding(self, name: str | None) -> set[str]:
         """What is in or on a thing, at any depth."""
@@ -296,9 +310,10 @@ class SceneMemory:
                     track.interior_seen = False
                 elif shut is Truth.FALSE and name in seen:
                     track.interior_seen |= interior_observed(track, views, self._config)
+        noted = {n for n in unlocated(views) if self.tracks[n].vague}
         for name, track in self.tracks.items():
             codes = fate.get(name)
-            if name in seen:
+            if name in seen or name in noted:
                 track.seen = Seen.VISIBLE
             else:
                 covered = codes is not None and float((codes == Fate.OCCLUDED).mean()) > 0.5
@@ -315,7 +330,7 @@ class SceneMemory:
         hidden = [
             n
             for n, t in self.tracks.items()
-            if self._domain.encloses(t.category) and not t.interior_seen
+            if t.vague or (self._domain.encloses(t.category) and not t.interior_seen)
         ]
         return SceneGraph(tuple(nodes), tuple(self._relations), hidden=tuple(hidden))
 

@@ -24,7 +24,7 @@ class Track:
     """One object as believed now; `points_world_m` is None when its place is not known.
 
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
-    view that showed it showed it where it was before.
+    view that showed it showed it where it was before, `vague` that it was seen and never located.
     """
 
     id: str
@@ -42,6 +42,7 @@ class Track:
     parent: Parent | None = None
     interior_seen: bool = False
     unmoved: bool = False
+    vague: bool = False
 
     def move(self, offset_m: Points) -> None:
         """Shift everything that is remembered of its place."""
@@ -61,7 +62,8 @@ class Track:
 class View:
     """One frame with what was found in it; everything but the frame and `labels` by label.
 
-    `features` are None without an image encoder and for what has no cloud.
+    `features` are None without an image encoder and for what has no cloud. `unlocated` tells what
+    is seen and has no place, because no depth returned or the segmenter is not sure of its mask.
     """
 
     frame: Frame
@@ -71,6 +73,7 @@ class View:
     clouds: tuple[Cloud | None, ...]
     states: tuple[Mapping[str, str | None], ...]
     features: tuple[bytes | None, ...]
+    unlocated: tuple[bool, ...]
 
 
 class Fate(IntEnum):

@@ -69,6 +69,8 @@ class Frame:
             categories of what is in view and no state of it.
         instance_names: instance names such as "Mug-1", by index.
         detections: masks that came with the frame from outside, if any.
+        colour_only: nothing measured depth; `depth_m` is 0 everywhere, and whatever needs depth is
+            unobserved.
 
     Raises:
         PerceptionError: a shape, type or value that cannot be used.
@@ -81,6 +83,7 @@ class Frame:
     instance_ids: npt.NDArray[np.int32] | None = None
     instance_names: tuple[str, ...] = ()
     detections: tuple[Detection, ...] | None = None
+    colour_only: bool = False
 
     def __post_init__(self) -> None:
         size = (self.intrinsics.height, self.intrinsics.width)
@@ -104,6 +107,12 @@ class Frame:
         rotation = self.camera_to_world[:3, :3]
         if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
             raise PerceptionError("camera_to_world has no rotation matrix in its upper left")
+        if float(np.linalg.det(rotation)) < 0:
+            raise PerceptionError(
+                "camera_to_world is left-handed: a mirror image of the world, not a turn of it"
+            )
+        if self.colour_only and bool(self.depth_m.any()):
+            raise PerceptionError("a frame of colour alone has depth_m 0 everywhere")
         if self.instance_ids is not None and self.instance_ids.shape != size:
             raise PerceptionError(f"instance_ids must be {size}, got {self.instance_ids.shape}")
         for d in self.detections or ():
