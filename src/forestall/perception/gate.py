@@ -168,8 +168,9 @@ def _depth(look: Coarse, index: int, limits: GateConfig) -> Iterator[Finding]:
     if not limits.min_distance_m <= middle <= limits.max_distance_m:
         yield Finding(
             "distances",
-            f"distances that cannot be: half of the picture is nearer than {middle:.4g} m; "
-            "declare the unit that depth is in (depth_unit)",
+            f"distances that cannot be: their median is {middle:.4g} m, expected "
+            f"{limits.min_distance_m:g} to {limits.max_distance_m:g}; declare the unit that depth "
+            "is in (depth_unit)",
             index,
         )
         return

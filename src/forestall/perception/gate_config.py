@@ -105,10 +105,12 @@ class WatchConfig:
             believed: a renderer repeats itself, a real camera never does.
         max_speed_m_s: of a camera.
         jump_m: how far a thing that nothing moved may be seen from where it was.
+        arm_m: what is nearer to the hand may have been moved by it, or with what it holds.
         jump_share: share of what is seen twice that must have jumped to doubt the pose.
         min_jumps: at least so many things.
         small_m: largest extent of things whose place is compared; of larger ones each view shows
             another part.
+        least_cells: cells of the coarse lattice that must show a thing for that.
     """
 
     moved_m: float = 0.002
@@ -116,6 +118,8 @@ class WatchConfig:
     most_equal: int = 2
     max_speed_m_s: float = 10.0
     jump_m: float = 0.3
+    arm_m: float = 0.4
     jump_share: float = 0.6
     min_jumps: int = 3
-    small_m: float = 0.8
+    small_m: float = 0.6
+    least_cells: int = 20

@@ -25,8 +25,12 @@ class Finding:
     refuses: bool = True
 
 
-def refuse(findings: Sequence[Finding]) -> None:
+def refuse(findings: Sequence[Finding], source: str = "") -> None:
     """Raise what refuses an observation, if anything does.
+
+    Args:
+        findings: of the gate.
+        source: where the observation comes from, a file.
 
     Raises:
         ObservationError: with the first reason, the number of others, and all findings.
@@ -35,7 +39,8 @@ def refuse(findings: Sequence[Finding]) -> None:
     if not grounds:
         return
     first = grounds[0]
-    where = "" if first.frame is None else f"frame {first.frame}: "
+    where = f"{source}: " if source else ""
+    where += "" if first.frame is None else f"frames.{first.frame}: "
     others = sorted({f.what for f in grounds[1:]} - {first.what})
     more = f" (also: {', '.join(others)})" if others else ""
     raise ObservationError(f"{where}{first.what}: {first.sentence}{more}", findings)
