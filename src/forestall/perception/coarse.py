@@ -47,6 +47,7 @@ class Coarse:
         labels: (h, w) index into the names, -1 for none.
         categories: of each label.
         instances: name of each label, None where the segmenter does not track.
+        outlined: whether every mask ends where its thing ends.
     """
 
     frame: Frame
@@ -54,6 +55,7 @@ class Coarse:
     labels: Labels
     categories: tuple[str, ...]
     instances: tuple[str | None, ...]
+    outlined: bool = True
 
     @classmethod
     def of(cls, frame: Frame, masks: Masks | None, rows: int) -> Coarse:
@@ -68,8 +70,15 @@ class Coarse:
             labels = masks.labels
         else:
             labels = masks.labels[::step, ::step]
-        categories = tuple(d.category for d in masks.detections)
-        return cls(frame, step, labels, categories, tuple(d.instance for d in masks.detections))
+        found = masks.detections
+        return cls(
+            frame,
+            step,
+            labels,
+            tuple(d.category for d in found),
+            tuple(d.instance for d in found),
+            all(d.outlined for d in found),
+        )
 
     @cached_property
     def depth_m(self) -> npt.NDArray[np.float32]:
@@ -130,7 +139,8 @@ class Coarse:
 
     def cells(self, label: int) -> Flags:
         """(h, w) where one mask has depth."""
-        return (self.labels == label) & self.known
+        cells: Flags = (self.labels == label) & self.known
+        return cells
 
     def cut(self, label: int) -> bool:
         """Whether a mask reaches the border of the picture."""

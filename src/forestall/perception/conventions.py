@@ -206,7 +206,8 @@ def mask_of(
                 f"a mask has the values {', '.join(f'{v:g}' for v in values)}: scores are "
                 "thresholded only where mask_kind is declared"
             )
-    return raw != 0
+    mask: Mask = raw != 0
+    return mask
 
 
 def _above(raw: npt.NDArray[Any], kind: str, threshold: float | None) -> Mask:
@@ -220,7 +221,8 @@ def _above(raw: npt.NDArray[Any], kind: str, threshold: float | None) -> Mask:
                 f"scores of a mask go from {low:g} to {high:g}: they must lie in [0, 1]; "
                 "declare mask_kind logits if they are"
             )
-    return raw > least
+    mask: Mask = raw > least
+    return mask
 
 
 def _known(

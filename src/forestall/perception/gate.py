@@ -65,19 +65,20 @@ def inspect(
             findings += judge_scene(look, index, observation, domain, limits)
     findings += _scores(scores, limits)
     if looks:
-        findings += judge_hand(looks[-1], observation, limits)
+        for hand in observation.hands:
+            findings += judge_hand(looks[-1], hand, limits)
     return tuple(findings)
 
 
 def _numbers(observation: Observation) -> Iterator[Finding]:
     """Places and times that are no numbers, or beyond every scene."""
-    gripper = observation.gripper
-    places = [
+    places: list[tuple[str, tuple[float, ...]]] = [
         ("time_s", (observation.time_s,)),
-        ("the gripper's position", gripper.position_world_m),
         ("the robot's position", observation.robot_position_world_m),
-        ("where the gripper let go", gripper.released_world_m or ()),
     ]
+    for hand in observation.hands:
+        places.append((f"the position of {hand.name}", hand.position_world_m))
+        places.append((f"where {hand.name} let go", hand.released_world_m or ()))
     for name, values in places:
         if not all(math.isfinite(v) for v in values):
             yield Finding("numbers", f"{name} is not finite: {', '.join(map(str, values))}")

@@ -30,7 +30,8 @@ def judge_masks(
         yield Finding("masks", "nothing was detected in this picture", index, refuses=False)
         return
     yield from _shares(look, index, domain, limits)
-    yield from _alignment(look, index, limits)
+    if look.outlined:
+        yield from _alignment(look, index, limits)
 
 
 def _shares(

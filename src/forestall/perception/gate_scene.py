@@ -16,7 +16,7 @@ from forestall.perception.coarse import Coarse
 from forestall.perception.gate_config import GateConfig
 from forestall.perception.unproject import Points
 from forestall.types.finding import Finding
-from forestall.types.observation import Observation
+from forestall.types.observation import GripperState, Observation
 
 _PATCHES = 1500
 _DIRECTIONS = 300
@@ -46,16 +46,16 @@ def judge_scene(
     yield from _sizes(look, index, domain, limits)
 
 
-def judge_hand(look: Coarse, observation: Observation, limits: GateConfig) -> Iterator[Finding]:
+def judge_hand(look: Coarse, hand: GripperState, limits: GateConfig) -> Iterator[Finding]:
     """What the robot holds is seen where its hand is, or not at all."""
-    held = observation.gripper.holding
+    held = hand.holding
     if held is None or held not in look.instances:
         return
     cells = look.cells(look.instances.index(held))
     if not cells.any():
         return
-    hand = np.asarray(observation.gripper.position_world_m)
-    off = np.sqrt(((look.points_world_m[cells] - hand) ** 2).sum(axis=1))
+    place = np.asarray(hand.position_world_m)
+    off = np.sqrt(((look.points_world_m[cells] - place) ** 2).sum(axis=1))
     if float(off.min()) > limits.hand_off_m:
         yield Finding(
             "hand",

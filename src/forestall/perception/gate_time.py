@@ -115,7 +115,7 @@ class SenseWatch:
     def _jumps(self, last: _Last, now: Observation, places: Places) -> Iterator[Finding]:
         if now.frames and last.observation.frames:
             yield from self._camera(last.observation, now)
-        hands = (last.observation.gripper, now.gripper)
+        hands = (*last.observation.hands, *now.hands)
         busy = {n for hand in hands for n in (hand.holding, hand.released)}
         both = [
             n

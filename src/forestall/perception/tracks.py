@@ -16,7 +16,7 @@ from forestall.perception.config import PerceptionConfig
 from forestall.perception.support import Parent
 from forestall.perception.unproject import Cloud, Labels, Points, project
 from forestall.types.graph import Seen
-from forestall.types.observation import Frame
+from forestall.types.observation import Frame, Vec3
 
 
 @dataclass(slots=True)
@@ -74,6 +74,9 @@ class View:
     states: tuple[Mapping[str, str | None], ...]
     features: tuple[bytes | None, ...]
     unlocated: tuple[bool, ...]
+
+
+_MOST_POINTS = 6000
 
 
 class Fate(IntEnum):
@@ -157,3 +160,32 @@ def interior_observed(track: Track, views: Sequence[View], config: PerceptionCon
         if float(open_view.mean()) >= config.interior_share:
             return True
     return False
+
+
+def middle(track: Track) -> Points:
+    """Midpoint of a track's box."""
+    centre: Points = (track.low_m + track.high_m) / 2
+    return centre
+
+
+def gap_m(one: Track, other: Track) -> float:
+    """Distance between two boxes."""
+    apart = np.maximum(one.low_m - other.high_m, other.low_m - one.high_m)
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
+
+
+def thinned(points: Points, voxel_m: float) -> Points:
+    """One point for each voxel (the first, that is the newest), at most a fixed number."""
+    cell = np.floor(points / voxel_m).astype(np.int64) + (1 << 19)
+    key = (cell[:, 0] << 40) | (cell[:, 1] << 20) | cell[:, 2]
+    _, first = np.unique(key, return_index=True)
+    if len(first) > _MOST_POINTS:
+        first = first[np.linspace(0, len(first) - 1, _MOST_POINTS).astype(np.int64)]
+    kept: Points = points[first]
+    return kept
+
+
+def vec(values: Points) -> Vec3:
+    """Three numbers, rounded to a tenth of a millimetre."""
+    x, y, z = (round(float(v), 4) for v in values)
+    return (x, y, z)

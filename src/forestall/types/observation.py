@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import PerceptionError
+from forestall.types.facts import GRIPPER
 
 if TYPE_CHECKING:
     from forestall.types.graph import SceneGraph
@@ -46,13 +47,17 @@ class Detection:
     """One instance mask: what a segmenter found.
 
     `mask` is (H, W) bool. `instance` is a name that stays the same over frames when the segmenter
-    tracks instances (for example "Mug-1"), otherwise None. `score` is in [0, 1].
+    tracks instances (for example "Mug-1"), otherwise None. `score` is in [0, 1]. `outlined` is
+    False for a mask that was made of a box: where the thing ends is not known. `states` are
+    (attribute, value) that whoever found it knows of it.
     """
 
     category: str
     mask: Mask
     instance: str | None = None
     score: float = 1.0
+    outlined: bool = True
+    states: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,12 +135,21 @@ class GripperState:
     `holding` is the instance name of what is held as the robot knows it, None for an empty hand.
     `position_world_m` is where the hand is. `released` is what the subtask just executed let go on
     purpose, `released_world_m` where: the arm knows it, whether or not the camera sees it.
+    `name` is the hand's node in the graph, one of the domain's hands. `told` is False for a robot
+    without a hand, or one that does not tell: then nothing is known of what it holds.
     """
 
     holding: str | None
     position_world_m: Vec3
     released: str | None = None
     released_world_m: Vec3 | None = None
+    name: str = GRIPPER
+    told: bool = True
+
+    @classmethod
+    def untold(cls) -> GripperState:
+        """No hand, or none that tells."""
+        return cls(None, (0.0, 0.0, 0.0), told=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,6 +162,7 @@ class Observation:
         time_s: of the world's clock.
         robot_position_world_m: where the robot stands.
         graph: what is in view as a scene graph, from a source that needs no pictures.
+        others: further hands.
 
     Raises:
         PerceptionError: neither a frame nor a graph.
@@ -158,7 +173,16 @@ class Observation:
     time_s: float
     robot_position_world_m: Vec3 = (0.0, 0.0, 0.0)
     graph: SceneGraph | None = None
+    others: tuple[GripperState, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.frames and self.graph is None:
             raise PerceptionError("an observation needs at least one frame, or a scene graph")
+        names = [hand.name for hand in self.hands]
+        if len(set(names)) != len(names):
+            raise PerceptionError(f"two hands have the same name: {', '.join(names)}")
+
+    @property
+    def hands(self) -> tuple[GripperState, ...]:
+        """Every hand that tells, the first one first."""
+        return tuple(hand for hand in (self.gripper, *self.others) if hand.told)
