@@ -101,13 +101,14 @@ def _gravity(look: Coarse, limits: GateConfig) -> str | None:
     walls = level - flat
     level = np.where((flat > limits.clear_flat) & (walls > limits.clear_flat), level, 0.0)
     best = int(level.argmax())
-    if float(level[best]) < limits.clear_upright:
-        return None
-    angle = float(np.degrees(np.arccos(_candidates()[best, 2])))
-    return (
-        f"the room leans by {angle:.0f} degrees: {100 * float(level[best]):.0f} % of its surfaces "
-        f"lie or stand by that direction, {100 * float(stated[0]):.0f} % by the stated one: {_AXES}"
-    )
+    if float(level[best]) >= limits.clear_upright:
+        angle = float(np.degrees(np.arccos(_candidates()[best, 2])))
+        return (
+            f"the room leans by {angle:.0f} degrees: {100 * float(level[best]):.0f} % of its "
+            f"surfaces lie or stand by that direction, {100 * float(stated[0]):.0f} % by the "
+            f"stated one: {_AXES}"
+        )
+    return None
 
 
 def _from_below(look: Coarse, normals: Points, limits: GateConfig) -> bool:
