@@ -26,9 +26,9 @@ ROOM = [
 ]
 
 
-def room(**options: object) -> Observation:
+def room() -> Observation:
     """What the robot sees of the room with a plate in its hand, noise on every colour."""
-    seen = observed(ROOM, EYE, holding="Plate-1", hand=HAND, time_s=2.0, **options)
+    seen = observed(ROOM, EYE, holding="Plate-1", hand=HAND, time_s=2.0)
     noise = np.random.default_rng(0).integers(0, 20, seen.frames[0].rgb.shape)
     rgb = np.clip(seen.frames[0].rgb.astype(np.int64) + noise, 0, 255).astype(np.uint8)
     return with_frame(seen, lambda frame: replace(frame, rgb=rgb))

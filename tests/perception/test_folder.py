@@ -289,7 +289,7 @@ def along_the_ray(depth: np.ndarray) -> np.ndarray:
 TURN_Y = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 
 
-def with_y_up(data: dict) -> None:
+def with_y_up(data: dict[str, Any]) -> None:
     for frame in data["frames"]:
         frame["camera_to_world"] = (TURN_Y @ frame["camera_to_world"]).tolist()
     data["gripper"]["position_m"] = (TURN_Y[:3, :3] @ data["gripper"]["position_m"]).tolist()
@@ -297,8 +297,8 @@ def with_y_up(data: dict) -> None:
     data["up"] = "y"
 
 
-def with_their_axes(turn: np.ndarray) -> Callable[[dict], None]:
-    def change(data: dict) -> None:
+def with_their_axes(turn: np.ndarray) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
         frame = data["frames"][0]
         pose = np.array(frame["camera_to_world"])
         pose[:3, :3] = pose[:3, :3] @ turn
@@ -308,7 +308,7 @@ def with_their_axes(turn: np.ndarray) -> Callable[[dict], None]:
 
 
 ROS = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0.0]])
-DECLARED: dict[str, tuple[Callable[[Path], None], dict]] = {
+DECLARED: dict[str, tuple[Callable[[Path], None], dict[str, Any]]] = {
     "millimetres": (lambda f: redone(f, lambda z: z * 1000), {"depth_unit": "mm"}),
     "whole millimetres": (
         lambda f: redone(f, lambda z: np.round(z * 1000).astype(np.uint16)),
@@ -352,7 +352,7 @@ def test_what_is_not_declared_is_refused_by_the_gate(folder: Path, name: str) ->
 
 
 def test_a_rounded_rotation_is_projected_to_the_nearest(folder: Path) -> None:
-    def rounded(data: dict) -> None:
+    def rounded(data: dict[str, Any]) -> None:
         frame = data["frames"][0]
         frame["camera_to_world"] = np.round(frame["camera_to_world"], 3).tolist()
 
@@ -373,9 +373,9 @@ def test_a_byte_order_mark_is_no_fault(folder: Path) -> None:
 
 def as_npz(folder: Path, make: Callable[[np.ndarray], np.ndarray], **declared: object) -> None:
     ids = np.array(Image.open(folder / "masks.png"))
-    arrays = {}
+    arrays: dict[str, Any] = {}
 
-    def change(data: dict) -> None:
+    def change(data: dict[str, Any]) -> None:
         data.update(declared)
         frame = data["frames"][0]
         frame["masks"] = "masks.npz"
@@ -387,7 +387,7 @@ def as_npz(folder: Path, make: Callable[[np.ndarray], np.ndarray], **declared: o
     np.savez(folder / "masks.npz", **arrays)
 
 
-MASKS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], dict]] = {
+MASKS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], dict[str, Any]]] = {
     "bool": (lambda m: m, {}),
     "0 and 255": (lambda m: (m * 255).astype(np.uint8), {}),
     "0 and 1": (lambda m: m.astype(np.float32), {}),
@@ -410,7 +410,7 @@ def test_masks_of_every_declared_kind_are_read(folder: Path, kind: str) -> None:
     assert all(np.array_equal(a.mask, b.mask) for a, b in zip(found, expected, strict=True))
 
 
-BAD_MASKS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], dict, str]] = {
+BAD_MASKS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], dict[str, Any], str]] = {
     "soft": (lambda m: np.where(m, 0.97, 0.02), {}, "mask_kind"),
     "logits": (lambda m: np.where(m, 8.0, -8.0), {}, "mask_kind"),
     "logits as scores": (lambda m: np.where(m, 8.0, -8.0), {"mask_kind": "scores"}, "logits"),
@@ -434,7 +434,7 @@ def test_masks_that_say_nothing_sure_are_refused(folder: Path, kind: str) -> Non
 def one_each(folder: Path, make: Callable[[np.ndarray], Image.Image], **declared: object) -> None:
     ids = np.array(Image.open(folder / "masks.png"))
 
-    def change(data: dict) -> None:
+    def change(data: dict[str, Any]) -> None:
         data.update(declared)
         for d in data["frames"][0]["detections"]:
             d["mask"] = f"o{d['id']}.png"
@@ -449,7 +449,7 @@ def with_alpha(mask: np.ndarray, inside: int = 255, outside: int = 0) -> Image.I
     return Image.fromarray(np.dstack([*white, alpha]))
 
 
-PICTURES: dict[str, tuple[Callable[[np.ndarray], Image.Image], dict]] = {
+PICTURES: dict[str, tuple[Callable[[np.ndarray], Image.Image], dict[str, Any]]] = {
     "alpha": (with_alpha, {}),
     "soft alpha": (lambda m: with_alpha(m, 250, 3), {"mask_kind": "alpha"}),
     "grey": (lambda m: Image.fromarray((m * 255).astype(np.uint8)), {}),
@@ -492,7 +492,7 @@ def test_large_ids_are_read_from_tiff_and_npy(folder: Path, name: str) -> None:
     else:
         Image.fromarray(large).save(folder / name)
 
-    def change(data: dict) -> None:
+    def change(data: dict[str, Any]) -> None:
         data["frames"][0]["masks"] = name
         for d in data["frames"][0]["detections"]:
             d["id"] += 70000

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def refused(observation: Observation) -> set[str]:
     return {f.what for f in inspect(observation, HOUSEHOLD) if f.refuses}
 
 
-def camera(**values: float) -> Callable[[Observation], Observation]:
+def camera(**values: Any) -> Callable[[Observation], Observation]:
     return lambda o: with_frame(o, lambda f: replace(f, intrinsics=replace(f.intrinsics, **values)))
 
 
@@ -40,7 +41,7 @@ def scaled_camera(by: float) -> Callable[[Observation], Observation]:
     return lambda o: with_frame(o, change)
 
 
-def depth(change: Callable[[Depth], Depth]) -> Callable[[Observation], Observation]:
+def depth(change: Callable[[Depth], np.ndarray]) -> Callable[[Observation], Observation]:
     def changed(frame: Frame) -> Frame:
         return replace(frame, depth_m=np.ascontiguousarray(change(frame.depth_m), dtype=np.float32))
 
@@ -74,7 +75,7 @@ def turned(matrix: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def noise(values: Depth) -> Depth:
+def noise(values: Depth) -> np.ndarray:
     return np.random.default_rng(1).uniform(0.5, 3.0, values.shape)
 
 

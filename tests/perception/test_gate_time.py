@@ -92,7 +92,7 @@ def test_things_that_nothing_moved_do_not_jump_together() -> None:
     watch = SenseWatch()
     watch.look(observed(ROOM[:-1], EYE, time_s=1.0))
     wrong = shifted(observed(ROOM[:-1], EYE, time_s=2.0), 0.6)
-    found = watch.look(with_frame(wrong, lambda f: replace(f, rgb=f.rgb ^ 1)))
+    found = watch.look(with_frame(wrong, lambda f: replace(f, rgb=f.rgb ^ np.uint8(1))))
     assert [(f.what, f.refuses) for f in found] == [("jump", True)]
     assert "Mug-1" in found[0].sentence
 

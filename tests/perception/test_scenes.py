@@ -168,7 +168,7 @@ def test_detections_of_others_are_taken_as_they_are() -> None:
     assert bare.frames[0].colour_only
     full = Detections(
         boxes,
-        np.stack([f.mask for f in things()]),
+        np.stack([np.asarray(f.mask) for f in things()]),
         np.full(len(found), 0.9),
         np.arange(len(found)) + 5,
         {"class_name": names},

@@ -8,8 +8,10 @@ synonym. Everything else is a thing of its own, never a guess and never a refusa
 
 from __future__ import annotations
 
+import difflib
 import re
 import unicodedata
+from collections.abc import Collection
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError
@@ -22,6 +24,7 @@ _HASH = re.compile(r"_(?=[0-9a-f]*\d)[0-9a-f]{6,}$")
 _NUMBER = re.compile(r"[-_ .#:]*(\d+)$")
 _NO_NAME = re.compile(r"[\s(),=\x00-\x1f\x7f]+")
 _LONGEST = 80
+_SLIP = 0.75
 
 
 class Words:
@@ -62,6 +65,11 @@ class Words:
         Instances keep their number: "coffee mug-2" is "Mug-2".
         """
         return Subtask(said.skill, tuple(self._argument(a) for a in said.args))
+
+    def slip(self, said: str) -> bool:
+        """Whether a word that means nothing here is nearly one that does: a slip of the pen."""
+        near = difflib.get_close_matches(category_of(said), self._domain.categories, 1, _SLIP)
+        return bool(near) and not self.knows(said)
 
     def _argument(self, said: str) -> str:
         if said in self._domain.robot.hands or self._domain.find(said) is not None:
@@ -119,10 +127,15 @@ class Names:
 
     def next(self, category: str) -> str:
         """The first free name of a category, taken from now on."""
+        name = self.free(category)
+        self._taken.add(name)
+        return name
+
+    def free(self, category: str, used: Collection[str] = ()) -> str:
+        """The first name of a category that is neither taken nor used."""
         number = 1
-        while f"{category}-{number}" in self._taken:
+        while f"{category}-{number}" in self._taken or f"{category}-{number}" in used:
             number += 1
-        self._taken.add(f"{category}-{number}")
         return f"{category}-{number}"
 
     def __contains__(self, said: str) -> bool:

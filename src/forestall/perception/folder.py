@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -115,7 +115,10 @@ class _Document(_Conventions):
 
 
 def read_observation(
-    path: Path | str, domain: Domain | None = None, gate: GateConfig | None = _GATE
+    path: Path | str,
+    domain: Domain | None = None,
+    gate: GateConfig | None = _GATE,
+    names: Names | None = None,
 ) -> tuple[Observation, Mapping[str, Mapping[str, str]]]:
     """Read a stored observation and the states that were written down with it.
 
@@ -123,6 +126,7 @@ def read_observation(
         path: the folder.
         domain: which categories and states there are; the household's by default.
         gate: what observations cannot be; None lets everything in.
+        names: of the run that it is a part of, so that ids mean the same things all along.
 
     Raises:
         FileFormatError: a file is missing or cannot be read as what it should be, or what it says
@@ -133,7 +137,7 @@ def read_observation(
     folder = Path(path)
     words = domain or shipped("household")
     document = _document(folder)
-    reading = _Reading(folder, document, words)
+    reading = _Reading(folder, document, words, names or Names(words))
     frames = tuple(reading.frame(data, index) for index, data in enumerate(document.frames))
     holding = document.gripper.holding
     with _located(folder, "gripper"):
@@ -190,14 +194,17 @@ def _document(folder: Path) -> _Document:
 class _Reading:
     """One document being read: its names and states over all frames."""
 
-    def __init__(self, folder: Path, document: _Document, domain: Domain) -> None:
+    def __init__(self, folder: Path, document: _Document, domain: Domain, names: Names) -> None:
         self._folder, self._document, self._domain = folder, document, domain
-        self._names = Names(domain)
+        self._names = names
+        self._numbered: set[str] = set()
         self.states = GivenStates()
-        for frame in document.frames:
-            for given in frame.detections:
-                if given.instance is not None:
-                    self._names.reserve(given.instance)
+        told = [d for frame in document.frames for d in frame.detections if d.instance]
+        for given in told:
+            names.reserve(given.instance or "")
+        for given in told:
+            with suppress(InputError):  # said again, with its place, when its turn comes
+                names.instance(given.instance or "", names.words.category(given.category))
 
     def holding(self, said: str) -> str:
         """The instance that is held, by whatever id."""
@@ -271,7 +278,11 @@ class _Reading:
         names = self._names
         category = names.words.category(given.category)
         if given.instance is None:
-            return category, names.next(category) if alone else None
+            if not alone:
+                return category, None
+            name = names.free(category, self._numbered)
+            self._numbered.add(name)
+            return category, name
         other = category_of(given.instance)
         if names.words.knows(other) and names.words.category(other) != category:
             raise InputError(f"instance {given.instance!r} is not a {category}")

@@ -95,3 +95,8 @@ def test_arguments_of_subtasks_are_in_the_users_words() -> None:
     assert WORDS.subtask(said) == Subtask("put_in", ("Mug", "Microwave-2"))
     strange = Subtask("insert", ("potted meat can", "gripper"))
     assert WORDS.subtask(strange) == strange
+
+
+def test_a_slip_of_the_pen_is_told_from_a_strange_word() -> None:
+    assert WORDS.slip("Plaet") and WORDS.slip("Microwav-1")
+    assert not any(map(WORDS.slip, ("plate", "potted meat can", "Arbeitsfläche", "Peg")))
