@@ -25,6 +25,7 @@ from forestall.types.observation import Detection, Frame, Observation
 _SIDE = 640
 _LINE = 16
 _MARGIN = 36
+_FAR_M = 1e4
 _INK, _PALE, _PAPER, _ROBOT = (30, 30, 30), (205, 205, 205), (255, 255, 255), (190, 30, 30)
 _SEEN = {Seen.VISIBLE: "", Seen.REMEMBERED: " (remembered)", Seen.UNOBSERVED: " (unobserved)"}
 
@@ -135,8 +136,9 @@ def _plan(observation: Observation, graph: SceneGraph) -> Image.Image:
     for node in boxes:
         assert node.box_m is not None
         spots += [np.array(node.box_m.low[:2]), np.array(node.box_m.high[:2])]
-    if not spots:
-        draw.text((_MARGIN, _MARGIN), "nothing is located", _INK, _font())
+    if not spots or not float(np.abs(spots).max()) < _FAR_M:
+        why = "places are beyond every scene" if spots else "nothing is located"
+        draw.text((_MARGIN, _MARGIN), why, _INK, _font())
         return plan
     low, high = np.min(spots, axis=0) - 0.2, np.max(spots, axis=0) + 0.2
     map_ = _Map(low, (_SIDE - 2 * _MARGIN) / float(max(high - low)))
