@@ -19,6 +19,7 @@ from forestall.types.finding import Finding
 from forestall.types.observation import GripperState, Observation
 
 _PATCHES = 1500
+_APART_M = 0.08
 _DIRECTIONS = 300
 _UPWARDS = np.array([[0.0, 0.0, 1.0]])
 _AXES = (
@@ -112,8 +113,9 @@ def _gravity(look: Coarse, limits: GateConfig) -> str | None:
 
 
 def _from_below(look: Coarse, normals: Points, limits: GateConfig) -> bool:
-    """Whether a camera that is said to stand on its head sees undersides only."""
-    over = float(look.frame.camera_to_world[2, 1]) > 0.2
+    """Whether a camera that is said to stand on its head, or to look up, sees undersides only."""
+    pose = look.frame.camera_to_world
+    over = float(pose[2, 1]) > 0.2 or float(pose[2, 2]) > 0.9
     under = float((normals[:, 2] < -limits.level).mean())
     top = float((normals[:, 2] > limits.level).mean())
     return over and under > limits.clear_flat and top < 0.02
@@ -198,6 +200,16 @@ def _extents(look: Coarse, domain: Domain, limits: GateConfig) -> Iterator[tuple
         cells = look.cells(label)
         if int(cells.sum()) < limits.sized_cells:
             continue
-        low, high = np.percentile(look.points_world_m[cells], (4, 96), axis=0)
+        low, high = np.percentile(_main_part(look, label), (4, 96), axis=0)
         ratio = float(np.linalg.norm(high - low) / np.linalg.norm(known.size_m))
         yield look.instances[label] or category, ratio, look.cut(label)
+
+
+def _main_part(look: Coarse, label: int) -> Points:
+    """(n, 3) points of a mask without what a mask that is too wide shows behind or before it."""
+    points = look.points_world_m[look.cells(label)]
+    away = np.linalg.norm(points - look.frame.camera_to_world[:3, 3], axis=1)
+    order = np.argsort(away)
+    part = np.cumsum(np.diff(away[order], prepend=away[order[0]]) > _APART_M)
+    largest: Points = points[order[part == int(np.bincount(part).argmax())]]
+    return largest

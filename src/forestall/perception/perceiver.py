@@ -18,7 +18,13 @@ from forestall.perception.gate_config import GateConfig
 from forestall.perception.naming import name_detections
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
-from forestall.perception.unproject import Cloud, Labels, Points, clouds, label_image
+from forestall.perception.unproject import (
+    Cloud,
+    Labels,
+    Points,
+    clouds,
+    label_image,
+)
 from forestall.seams import ImageEncoder, Segmenter, StateEstimator
 from forestall.types.facts import category_of
 from forestall.types.feature import quantised
@@ -130,7 +136,9 @@ class GraphPerceiver:
                 f"the state estimator {self._estimator.name!r} answered for {len(states)} of "
                 f"{len(detections)} detections"
             )
-        found = clouds(frame, labels, [self._voxel_m(d) for d in detections], self._config)
+        fixed = [self._domain.is_a(d.category, self._domain.roles.fixture) for d in detections]
+        voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in fixed]
+        found = clouds(frame, labels, voxel_m, self._config, [not f for f in fixed])
         if self._gate is not None:
             least = self._gate.least_score
             found = [
@@ -170,11 +178,6 @@ class GraphPerceiver:
         except InputError as error:
             raise PerceptionError(f"the image encoder {encoder.name!r}: {error}") from error
         return tuple(features)
-
-    def _voxel_m(self, detection: Detection) -> float:
-        if self._domain.is_a(detection.category, self._domain.roles.fixture):
-            return self._config.fixture_voxel_m
-        return self._config.voxel_m
 
 
 def _placeless(
