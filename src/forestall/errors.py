@@ -16,10 +16,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from forestall.types.finding import Finding
+from typing import Any
 
 
 class ForestallError(Exception):
@@ -68,14 +65,14 @@ class ObservationError(InputError):
 
     Args:
         text: the first refusing finding, and how many more there are.
-        findings: everything that was found, those that refuse nothing too.
+        findings: all of them (`types.finding.Finding`), those that refuse nothing too.
     """
 
-    def __init__(self, text: str, findings: Sequence[Finding] = ()) -> None:
+    def __init__(self, text: str, findings: Sequence[Any] = ()) -> None:
         super().__init__(text)
         self.findings = tuple(findings)
 
-    def __reduce__(self) -> tuple[type, tuple[str, tuple[Finding, ...]]]:
+    def __reduce__(self) -> tuple[type, tuple[str, tuple[Any, ...]]]:
         return (type(self), (str(self), self.findings))
 
 

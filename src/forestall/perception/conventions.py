@@ -234,4 +234,4 @@ def _known(
 
 
 def _turn(up: str) -> npt.NDArray[np.float64]:
-    return _known(_UPS, "up", up)
+    return _known(_UPS, "up axis", up)

@@ -216,7 +216,7 @@ def _lines(
         far = "no depth" if known.size == 0 else f"median distance {np.median(known):.2f} m"
         yield (
             f"picture {index}: {k.width} x {k.height}, {wide:.0f} degrees wide, looks "
-            f"{'up' if pitch > 0 else 'down'} by {abs(pitch):.0f} degrees, {far}"
+            f"{'upwards' if pitch > 0 else 'downwards'} by {abs(pitch):.0f} degrees, {far}"
         )
     for hand in observation.hands:
         yield f"{hand.name}: {hand.holding or 'empty'}"
