@@ -4,7 +4,8 @@ ForestallError
 ├── InputError             what the user gave is not valid; one line that says what would be
 │   ├── UnknownNameError   a name that is not known, with the nearest known ones
 │   ├── FileFormatError    a file that cannot be read as what it should be
-│   └── DomainError        a domain that contradicts itself, or that something does not fit
+│   ├── DomainError        a domain that contradicts itself, or that something does not fit
+│   └── ObservationError   what was seen cannot be: units, camera, masks, dead senses
 ├── MemoryFileError        the demonstration file is empty, of another version, damaged or locked
 ├── ModelFileError         a model is missing or damaged, or cannot be run here
 ├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
@@ -14,7 +15,8 @@ ForestallError
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 
 class ForestallError(Exception):
@@ -56,6 +58,22 @@ class FileFormatError(InputError):
 
 class DomainError(InputError):
     """A domain that contradicts itself, or something that does not fit its domain."""
+
+
+class ObservationError(InputError):
+    """What was seen cannot be; nothing may be judged by it.
+
+    Args:
+        text: the first refusing finding, and how many more there are.
+        findings: all of them (`types.finding.Finding`), those that refuse nothing too.
+    """
+
+    def __init__(self, text: str, findings: Sequence[Any] = ()) -> None:
+        super().__init__(text)
+        self.findings = tuple(findings)
+
+    def __reduce__(self) -> tuple[type, tuple[str, tuple[Any, ...]]]:
+        return (type(self), (str(self), self.findings))
 
 
 class MemoryFileError(ForestallError):

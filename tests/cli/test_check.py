@@ -275,3 +275,36 @@ def test_the_plan_alone_may_be_checked_without_any_demonstration(
     assert "full of chips" in told["scenes"][0]["cause"]
     assert call(["check", str(graph), *asked]) == 2
     assert "give --memory FILE" in capsys.readouterr().err
+
+
+# --- what was understood ------------------------------------------------------------------------
+
+
+def test_what_was_understood_is_drawn_also_of_what_is_refused(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fine, broken = written(tmp_path / "01", PLATE, MUG), written(tmp_path / "02", PLATE, MUG)
+    document = json.loads((broken / "observation.json").read_text())
+    for row in document["frames"][0]["camera_to_world"][:3]:
+        row[1], row[2] = -row[1], -row[2]
+    (broken / "observation.json").write_text(json.dumps(document))
+    picture = tmp_path / "seen.png"
+    asked = ["--subtask", STEP, "--memory", str(memory), "--explain", str(picture)]
+    assert call(["check", str(fine), *asked]) == 0
+    assert picture.stat().st_size > 1000
+    picture.unlink()
+    assert call(["check", str(tmp_path), *asked]) == 2
+    assert "camera_axes" in capsys.readouterr().err
+    assert {p.name for p in tmp_path.glob("*.png")} == {"seen-1.png", "seen-2.png"}
+
+
+def test_arguments_and_things_are_in_the_users_words(memory: Path, tmp_path: Path) -> None:
+    folder = written(tmp_path / "fine", PLATE, MUG)
+    document = json.loads((folder / "observation.json").read_text())
+    for detection in document["frames"][0]["detections"]:
+        if detection["category"] == "Plate":
+            detection.update(category="dinner plate", instance="029_plate")
+    (folder / "observation.json").write_text(json.dumps(document))
+    asked = ["check", str(folder), "--memory", str(memory)]
+    assert call([*asked, "--subtask", "pick_up(dinner plate)"]) == 0
+    assert call([*asked, "--subtask", "pick_up(potted meat can)"]) == 4

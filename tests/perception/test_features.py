@@ -25,6 +25,7 @@ from .synthetic import Solid, at, looking, observed
 NEAR = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
 FAR = looking((0.0, -1.6, 1.65), (0.0, 0.3, 0.9))
 AWAY = looking((0.0, -0.7, 1.65), (0.0, -3.0, 0.9))
+FLOOR = Solid("Floor-1", (-4.0, -6.0, -0.02), (4.0, 4.0, 0.0))
 COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
 MUG = at("Mug-1", 0.1, 0.3, 0.9, (0.085, 0.085, 0.10), True)
 SCENE = [COUNTER, MUG]
@@ -101,11 +102,11 @@ def test_the_newest_observation_counts_and_what_is_out_of_view_keeps_its_own() -
     eyes.perceive(observed(SCENE, NEAR))
     far = observed(SCENE, FAR, time_s=1.0)
     eyes.perceive(far)
-    node = eyes.perceive(observed(SCENE, AWAY, time_s=2.0)).get("Mug-1")
+    node = eyes.perceive(observed([*SCENE, FLOOR], AWAY, time_s=2.0)).get("Mug-1")
     assert node is not None and node.seen is Seen.REMEMBERED
     assert node.feature == feature_in(far.frames[0], "Mug-1")
     eyes.reset()
-    assert eyes.perceive(observed(SCENE, AWAY, time_s=3.0)).get("Mug-1") is None
+    assert eyes.perceive(observed([*SCENE, FLOOR], AWAY, time_s=3.0)).get("Mug-1") is None
 
 
 def test_what_has_no_depth_is_not_encoded() -> None:
@@ -116,9 +117,10 @@ def test_what_has_no_depth_is_not_encoded() -> None:
     depth = np.where(mug, np.float32(0), frame.depth_m)
     eyes = perceiver(encoder)
     graph = eyes.perceive(replace(observation, frames=(replace(frame, depth_m=depth),)))
-    assert graph.get("Mug-1") is None
+    node = graph.get("Mug-1")
+    assert node is not None and node.centroid_m is None and node.feature is None
     assert encoder.asked == 1
-    blind = replace(frame, depth_m=np.zeros_like(depth))
+    blind = replace(frame, depth_m=np.zeros_like(depth), colour_only=True)
     eyes.perceive(replace(observation, frames=(blind,)))
     assert encoder.asked == 1
 

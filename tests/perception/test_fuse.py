@@ -18,6 +18,7 @@ from .synthetic import Solid, at, hollow, looking, observed
 
 EYE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
 AWAY = looking((0.0, -0.7, 1.65), (0.0, -3.0, 0.9))
+FLOOR = Solid("Floor-1", (-4.0, -6.0, -0.02), (4.0, 4.0, 0.0))
 COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
 MUG = (0.085, 0.085, 0.10)
 HAND = (0.0, -0.3, 1.2)
@@ -69,7 +70,7 @@ def test_what_ought_to_be_visible_and_is_not_has_gone() -> None:
 def test_what_is_out_of_view_is_remembered() -> None:
     robot = Robot()
     robot.sees([COUNTER, at("Mug-1", 0.0, 0.3, 0.9, MUG, True)])
-    graph = robot.sees([COUNTER], AWAY)
+    graph = robot.sees([COUNTER, FLOOR], AWAY)
     assert seen(graph, "Mug-1") is Seen.REMEMBERED
     assert seen(graph, "CounterTop-1") is Seen.REMEMBERED
     assert truth(graph, "on_top_of(Mug-1, CounterTop-1)") is Truth.TRUE
@@ -255,10 +256,14 @@ def test_what_is_held_is_placed_from_one_view_because_it_turns_with_the_robot() 
     robot.sees([COUNTER, at("Plate-1", 0.1, 0.3, 0.9, (0.22, 0.22, 0.02), True)])
     plate = at("Plate-1", 0.0, 0.0, 1.2, (0.22, 0.22, 0.02), True)
     potato = at("Potato-1", 0.0, 0.0, 1.22, (0.1, 0.07, 0.065))
-    first = observed([COUNTER, plate, potato], EYE, holding="Plate-1", time_s=5.0)
+    first = observed([COUNTER, plate, potato], EYE, holding="Plate-1", hand=HAND, time_s=5.0)
     shift = (0.15, 0.0, 0.0)
     second = observed(
-        [COUNTER, plate.moved(shift), potato.moved(shift)], EYE, holding="Plate-1", time_s=5.0
+        [COUNTER, plate.moved(shift), potato.moved(shift)],
+        EYE,
+        holding="Plate-1",
+        hand=HAND,
+        time_s=5.0,
     )
     graph = robot._perceiver.perceive(replace(second, frames=(*first.frames, *second.frames)))
     for name in ("Plate-1", "Potato-1"):

@@ -1,16 +1,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from forestall.domain.load import shipped
+from forestall.domain.truth import truth
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
-from forestall.types.graph import SceneGraph
+from forestall.types.facts import Literal, Truth
+from forestall.types.graph import Relation, SceneGraph
 
 from .synthetic import Solid, at, hollow, looking, observed
 
@@ -210,3 +213,45 @@ def test_boxes_are_where_things_are() -> None:
     assert np.allclose(node.box_m.low, (0.1575, 0.2575, 0.9), atol=0.012)
     assert np.allclose(node.box_m.high[0], 0.2425, atol=0.012)
     assert np.allclose(node.box_m.high[2], 1.0, atol=0.012)
+
+
+# --- things that do not belong where they are -----------------------------------------------------
+
+OVEN = hollow("Microwave-1", (-0.25, 0.15, 0.9), (0.25, 0.55, 1.2), 0.02, "front")
+BLOCK = (0.12, 0.1, 0.08)
+
+
+@pytest.mark.parametrize("name", ["Bowl-1", "Book-1", "Knife-1", "vase-1", "potted meat can-1"])
+def test_whatever_is_within_walls_is_in_there(name: str) -> None:
+    scene = [COUNTER, *OVEN, at(name, 0.0, 0.35, 0.92, BLOCK)]
+    eye = looking((0.0, -0.9, 1.3), (0.0, 0.35, 0.95))
+    graph = graph_of(scene, eye, states={"Microwave-1": {"open": "open"}})
+    assert Relation(name, "inside", "Microwave-1") in graph.relations
+    empty = Literal.parse("vacant(Microwave-1)")
+    assert truth(graph, empty, shipped("household")) is Truth.FALSE
+
+
+def test_a_strange_thing_stands_on_what_it_stands_on() -> None:
+    graph = graph_of([COUNTER, at("toaster oven toy-1", 0.0, 0.3, 0.9, BLOCK)], EYE)
+    assert Relation("toaster oven toy-1", "on_top_of", "CounterTop-1") in graph.relations
+
+
+# --- masks that are a pixel too wide --------------------------------------------------------------
+
+
+def test_what_a_wide_mask_shows_far_behind_is_no_part_of_the_thing() -> None:
+    counter = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.4, 0.9))
+    wall = Solid("Wall-1", (-3.0, 2.0, 0.0), (3.0, 2.1, 2.6))
+    mug = at("Mug-1", 0.0, 0.3, 0.9, (0.085, 0.085, 0.1), True)
+    seen = observed([counter, wall, mug], looking((0.0, -0.9, 1.1), (0.0, 0.3, 0.95)))
+    frame = seen.frames[0]
+    assert frame.instance_ids is not None
+    own = frame.instance_names.index("Mug-1")
+    rows, columns = np.nonzero(frame.instance_ids == own)
+    ids = frame.instance_ids.copy()
+    ids[rows.min() - 2 : rows.min(), columns.min() : columns.max()] = own
+    wide = replace(seen, frames=(replace(frame, instance_ids=ids),))
+    perceiver = GraphPerceiver(InstanceSegmenter(), GivenStateEstimator({}), shipped("household"))
+    node = perceiver.perceive(wide).get("Mug-1")
+    assert node is not None and node.box_m is not None
+    assert max(node.box_m.size) < 0.13

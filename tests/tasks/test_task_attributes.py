@@ -102,8 +102,8 @@ def seen(loaded: LoadedTask, **states: str) -> SceneGraph:
     mask = np.zeros((48, 64), dtype=np.bool_)
     mask[15:35, 20:40] = True
     frame = Frame(
-        rgb=np.zeros((48, 64, 3), dtype=np.uint8),
-        depth_m=np.full((48, 64), 1.0, dtype=np.float32),
+        rgb=np.where(mask[:, :, None], (200, 40, 30), (90, 90, 90)).astype(np.uint8),
+        depth_m=np.where(mask, 0.2, 0.3).astype(np.float32),
         intrinsics=camera,
         camera_to_world=np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 1], [0, 0, 0, 1.0]]),
         detections=(Detection("Tomato", mask, "Tomato-1"),),

@@ -20,6 +20,7 @@ from forestall.assembly.registry import known
 from forestall.assembly.stored import Stored, is_graph, read_scene, scenes_in
 from forestall.conclusion import MonitorConfig, unlocated
 from forestall.domain.model import Domain
+from forestall.domain.words import Names, Words
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.kinds import PERCEIVER, STATES, STRATEGY
 from forestall.monitor import Monitor
@@ -125,7 +126,9 @@ def judge_stored(
         raise InputError("nothing to judge: give an observation folder or a graph file")
     config = _config(question, given or Given(), all(map(is_graph, scenes)))
     task, domain = _task(question, config, demonstrations)
-    wanted = None if question.subtask is None else Subtask.parse(question.subtask)
+    wanted = None
+    if question.subtask is not None:
+        wanted = _fitting(Subtask.parse(question.subtask), domain)
     if wanted is None and len(scenes) > len(task.plan):
         raise InputError(
             f"{len(scenes)} scenes for the {len(task.plan)} subtasks of the plan: give one for "
@@ -169,8 +172,9 @@ def _read(
     scenes: Sequence[Path], domain: Domain, stated: dict[str, Mapping[str, str]]
 ) -> Iterator[Stored]:
     """Scene by scene, so that few pictures are held at once; `stated` is what the last one says."""
+    names = Names(domain)
     for path in scenes:
-        stored = read_scene(path, domain)
+        stored = read_scene(path, domain, names)
         stated.clear()
         stated.update(stored.states)
         yield stored
@@ -252,10 +256,11 @@ def read_plan(text_or_file: str, domain: Domain) -> Plan:
 
 
 def _fitting(subtask: Subtask, domain: Domain) -> Subtask:
-    domain.check(subtask)
+    words = Words(domain)
     for name in subtask.args:
-        domain[name]
-    return subtask
+        if words.slip(name):
+            domain[name]
+    return domain.check(words.subtask(subtask))
 
 
 def _strategy(parts: Assembly, scenes: int) -> Strategy:

@@ -13,6 +13,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from forestall.domain.model import Domain
+from forestall.domain.words import Names
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.folder import OBSERVATION_FILE, read_observation
 from forestall.types.graph import SceneGraph
@@ -64,17 +65,17 @@ def is_graph(path: Path) -> bool:
     return path.suffix == GRAPH_SUFFIX and not path.is_dir()
 
 
-def read_scene(path: Path, domain: Domain) -> Stored:
-    """Read one scene.
+def read_scene(path: Path, domain: Domain, names: Names | None = None) -> Stored:
+    """Read one scene; `names` are those of the scenes before it.
 
     Raises:
         FileFormatError: a file is missing, cannot be read as what it should be, or says of things
             what means nothing in the domain.
-        UnknownNameError: a name in an observation folder that is not in the domain.
-        PerceptionError: depth or masks that cannot be used.
+        UnknownNameError: a state in an observation folder that is not in the domain.
+        ObservationError: what was seen cannot be.
     """
     if not is_graph(path):
-        return Stored(path, *read_observation(path, domain))
+        return Stored(path, *read_observation(path, domain, names=names))
     graph = read_graph(path)
     try:
         _check(graph, domain)

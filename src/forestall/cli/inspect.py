@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -77,6 +78,7 @@ def check(
     plan: str | None = None,
     task: str | None = None,
     page: Path | None = None,
+    explain: Path | None = None,
     memory: Path | None = None,
     domain: str | None = None,
     threshold: float | None = None,
@@ -99,6 +101,8 @@ def check(
         plan: "STEP; STEP", or a file with one step a line; the task's by default.
         task: the task's name, so that its own demonstrations are preferred.
         page: an HTML file to write about it.
+        explain: a picture to write of what was understood: masks with their names, the scene from
+            above; also of what is refused.
         memory: a demonstration file; the ready-made one of the task by default.
         domain: what everything is read in: a name, or a file (.toml, .pddl); the task's by default.
         threshold: alarm when no demonstration reaches this score.
@@ -127,6 +131,12 @@ def check(
     ).given()
     remembering = Given(tuple(part for part in given.parts if part[0] != STATES.name))
     wanted = run_config(task or "", given=remembering)
+    if explain is not None:
+        from forestall.assembly.explaining import explain_stored
+
+        own = wanted.load_domain() if task is None else wanted.load().domain
+        for place in explain_stored(scenes, explain, own):
+            print(place, file=sys.stderr)
     demonstrations, path = None, None
     if needs_memory(wanted):
         if task is None and memory_path(wanted) is None:

@@ -24,6 +24,7 @@ class GraphView:
 
     - What is outside every view is unobserved, never false: a thing, and what it has to others.
     - The inside of a container that no view reached may hold anything that is not in sight.
+    - Of what is in sight and has no place (no depth) it is not known what it is in, on or beside.
     """
 
     def __init__(self, graph: SceneGraph, domain: Domain) -> None:
@@ -39,6 +40,7 @@ class GraphView:
                 self._places.setdefault(r.subject, []).append(r.object)
         self._present = {(r.predicate, r.subject, r.object) for r in graph.relations}
         self._containing = containing
+        self._tied = {r.subject for r in graph.relations}
         self._kinds: dict[str, list[str]] = {}
 
     def node(self, name: str) -> ObjectNode | None:
@@ -82,6 +84,8 @@ class GraphView:
             return UNOBSERVED
         if target in self.domain.robot.hands:
             return FALSE  # a robot knows what it holds
+        if self._placeless(subject) or self._placeless(target):
+            return UNOBSERVED
         containing = predicate in self._containing
         if self._unseen(target) and not (containing and subject in self._places):
             return UNOBSERVED
@@ -95,6 +99,14 @@ class GraphView:
         """Whether a thing is known and no view can reach it: what it has to others is not seen."""
         node = self._nodes.get(name)
         return node is not None and node.seen is Seen.UNOBSERVED
+
+    def _placeless(self, name: str) -> bool:
+        """Whether a thing is seen where nothing tells how far away it is."""
+        if name not in self.graph.hidden or name in self._tied:
+            return False
+        node = self._nodes[name]
+        fixed = self.domain.is_a(node.category, self.domain.roles.fixture)
+        return node.box_m is None and node.seen is Seen.VISIBLE and not fixed
 
     def _may_be_hidden(self, name: str) -> bool:
         node = self._nodes[name]

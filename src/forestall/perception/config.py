@@ -24,6 +24,9 @@ class PerceptionConfig:
         fixture_voxel_m: the same for furniture, which is large.
         min_cell_support: pixels in a 4-voxel cell and its six neighbours below which the cell is
             an outlier (flying pixels at depth edges).
+        stray_gap_m: gap along the line of sight over which points of a mask are of two things.
+        stray_share: share of a movable thing's pixels under which such a part is not its own
+            (real masks, a pixel too wide: up to 0.08).
         box_percentile: share of points cut off at each end of a box.
         contact_above_m: how far a support's surface may lie above the lowest point that rests on
             it (dents, rims).
@@ -81,6 +84,8 @@ class PerceptionConfig:
     voxel_m: float = 0.008
     fixture_voxel_m: float = 0.02
     min_cell_support: int = 4
+    stray_gap_m: float = 0.08
+    stray_share: float = 0.1
     box_percentile: float = 0.01
     contact_above_m: float = 0.015
     contact_below_m: float = 0.035

@@ -1,16 +1,18 @@
 """Stored observations of the user's own: pictures, depth, masks, camera and hand as files.
 
 The format is described in `docs/observation-format.md`. Called by the command line; calls
-`folder_files.py` for single files. Every fault has its own message, which names the file and says
-what would be valid.
+`folder_files.py` for single files, `conventions.py` for declared units and axes, and
+`domain/words.py` for names. Every fault has its own message, which names the file and says what
+would be valid; what files that are in order cannot say together is for `gate.py` to find.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from PIL import Image
@@ -18,13 +20,35 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
-from forestall.errors import FileFormatError, UnknownNameError
+from forestall.domain.words import Names
+from forestall.errors import FileFormatError, InputError, PerceptionError, UnknownNameError
+from forestall.perception.conventions import (
+    CameraAxes,
+    DepthKind,
+    MaskKind,
+    Up,
+    camera_pose,
+    place,
+    z_depth,
+)
 from forestall.perception.folder_files import MaskFile, read_depth, read_rgb, single_mask
-from forestall.types.facts import category_of, is_instance
-from forestall.types.observation import Detection, Frame, GripperState, Intrinsics, Observation
+from forestall.perception.gate import inspect
+from forestall.perception.gate_config import GateConfig
+from forestall.types.facts import category_of
+from forestall.types.finding import refuse
+from forestall.types.observation import (
+    Detection,
+    Frame,
+    GripperState,
+    Intrinsics,
+    Mask,
+    Observation,
+)
 
 OBSERVATION_FILE = "observation.json"
 OBSERVATION_FORMAT = 1
+
+_GATE = GateConfig()
 
 GivenStates = dict[str, dict[str, str]]
 _Vec3 = tuple[float, float, float]
@@ -51,7 +75,23 @@ class _Detection(_Strict):
     states: dict[str, str] = {}
 
 
-class _Frame(_Strict):
+class _Conventions(_Strict):
+    """How a frame, or every frame of the document, is to be read; None: as is usual."""
+
+    depth_unit: str | float | None = None
+    depth_kind: DepthKind | None = None
+    camera_axes: CameraAxes | None = None
+    mask_kind: MaskKind | Literal["ids"] | None = None
+    mask_threshold: float | None = None
+
+    def over(self, other: _Conventions) -> _Conventions:
+        """These, and those of `other` where these say nothing."""
+        said = {k: getattr(self, k) for k in _Conventions.model_fields}
+        rest = {k: getattr(other, k) for k in _Conventions.model_fields}
+        return _Conventions(**{k: rest[k] if v is None else v for k, v in said.items()})
+
+
+class _Frame(_Conventions):
     intrinsics: _Camera
     camera_to_world: tuple[_Row, _Row, _Row, _Row]
     rgb: str = "rgb.png"
@@ -65,8 +105,9 @@ class _Gripper(_Strict):
     position_m: _Vec3
 
 
-class _Document(_Strict):
+class _Document(_Conventions):
     format: int
+    up: Up = "z"
     time_s: float = 0.0
     gripper: _Gripper
     robot_position_m: _Vec3 | None = None
@@ -74,35 +115,58 @@ class _Document(_Strict):
 
 
 def read_observation(
-    path: Path | str, domain: Domain | None = None
+    path: Path | str,
+    domain: Domain | None = None,
+    gate: GateConfig | None = _GATE,
+    names: Names | None = None,
 ) -> tuple[Observation, Mapping[str, Mapping[str, str]]]:
     """Read a stored observation and the states that were written down with it.
 
     Args:
         path: the folder.
         domain: which categories and states there are; the household's by default.
+        gate: what observations cannot be; None lets everything in.
+        names: of the run that it is a part of, so that ids mean the same things all along.
 
     Raises:
-        FileFormatError: a file is missing or cannot be read as what it should be.
-        UnknownNameError: a category, attribute or value that is not in the domain.
-        PerceptionError: depth or masks that cannot be used.
+        FileFormatError: a file is missing or cannot be read as what it should be, or what it says
+            cannot be used.
+        UnknownNameError: an attribute or value that is not in the domain.
+        ObservationError: the gate refuses it.
     """
     folder = Path(path)
     words = domain or shipped("household")
     document = _document(folder)
-    frames, states = [], GivenStates()
-    for index, data in enumerate(document.frames):
-        frames.append(_frame(folder, data, index, len(document.frames) == 1, words, states))
+    reading = _Reading(folder, document, words, names or Names(words))
+    frames = tuple(reading.frame(data, index) for index, data in enumerate(document.frames))
     holding = document.gripper.holding
-    if holding is not None:
-        holding = _instance(holding, words, f"{folder / OBSERVATION_FILE}: gripper.holding")
+    with _located(folder, "gripper"):
+        if holding is not None:
+            holding = reading.holding(holding)
+        hand = place(document.gripper.position_m, document.up)
+    with _located(folder, "robot_position_m"):
+        stands = document.robot_position_m
+        robot = _below(frames[-1]) if stands is None else place(stands, document.up)
     observation = Observation(
-        frames=tuple(frames),
-        gripper=GripperState(holding, document.gripper.position_m),
+        frames=frames,
+        gripper=GripperState(holding, hand),
         time_s=document.time_s,
-        robot_position_world_m=document.robot_position_m or _below(frames[-1]),
+        robot_position_world_m=robot,
     )
-    return observation, states
+    if gate is not None:
+        refuse(inspect(observation, words, gate), str(folder / OBSERVATION_FILE))
+    return observation, reading.states
+
+
+@contextmanager
+def _located(folder: Path, where: str) -> Iterator[None]:
+    """Say of a fault in which part of the document it is."""
+    try:
+        yield
+    except (FileFormatError, UnknownNameError):
+        raise
+    except (InputError, PerceptionError) as error:
+        raise FileFormatError(f"{folder / OBSERVATION_FILE}: {where}: {error}") from error
 
 
 def _document(folder: Path) -> _Document:
@@ -112,7 +176,7 @@ def _document(folder: Path) -> _Document:
     if not file.is_file():
         raise FileFormatError(f"{file} is missing: a stored observation begins with it")
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = json.loads(file.read_text(encoding="utf-8-sig"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise FileFormatError(f"{file} is not JSON: {error}") from error
     if isinstance(data, dict) and data.get("format") != OBSERVATION_FORMAT:
@@ -127,90 +191,136 @@ def _document(folder: Path) -> _Document:
         raise FileFormatError(f"{file}: {where}: {first['msg']}") from error
 
 
-def _frame(
-    folder: Path,
-    data: _Frame,
-    index: int,
-    alone: bool,
-    domain: Domain,
-    states: GivenStates,
-) -> Frame:
-    rgb = read_rgb(folder / data.rgb)
-    depth = read_depth(folder, data.depth, rgb.shape[:2])
-    height, width = depth.shape
-    camera = data.intrinsics
-    masks = MaskFile.open(folder, data.masks, depth.shape)
-    detections: list[Detection] = []
-    used: set[int | str | None] = set()
-    for number, given in enumerate(data.detections):
-        where = f"{folder / OBSERVATION_FILE}: frames.{index}.detections.{number}"
-        category = domain[given.category].name
-        instance = given.instance
-        if instance is not None:
-            instance = _instance(instance, domain, where)
-            if category_of(instance) != category:
-                raise FileFormatError(f"{where}: instance {instance!r} is not a {category}")
-        elif alone:
-            instance = _next_name(category, detections, data.detections)
-        if any(instance is not None and d.instance == instance for d in detections):
-            raise FileFormatError(f"{where}: instance {instance!r} occurs twice in this frame")
-        if given.states:
-            if instance is None:
-                raise FileFormatError(f"{where}: states need an instance, for example {category}-1")
-            states.setdefault(instance, {}).update(_states(given.states, category, domain))
-        source = given.id if given.id is not None else given.mask
-        if source in used:
-            raise FileFormatError(f"{where}: mask {source!r} belongs to another detection already")
-        used.add(source)
-        mask = _mask(folder, given, masks, where, depth.shape)
-        detections.append(Detection(category, mask, instance, given.score))
-    return Frame(
-        rgb=rgb,
-        depth_m=depth,
-        intrinsics=Intrinsics(width, height, camera.fx, camera.fy, camera.cx, camera.cy),
-        camera_to_world=np.asarray(data.camera_to_world, dtype=np.float64),
-        detections=tuple(detections),
-    )
+class _Reading:
+    """One document being read: its names and states over all frames."""
+
+    def __init__(self, folder: Path, document: _Document, domain: Domain, names: Names) -> None:
+        self._folder, self._document, self._domain = folder, document, domain
+        self._names = names
+        self._numbered: set[str] = set()
+        self.states = GivenStates()
+        told = [d for frame in document.frames for d in frame.detections if d.instance]
+        for given in told:
+            names.reserve(given.instance or "")
+        for given in told:
+            with suppress(InputError):  # said again, with its place, when its turn comes
+                names.instance(given.instance or "", names.words.category(given.category))
+
+    def holding(self, said: str) -> str:
+        """The instance that is held, by whatever id."""
+        if said not in self._names and self._names.words.category(said) == said:
+            raise InputError(f"holding {said!r} needs a number, for example {said}-1")
+        return self._names.instance(said)
+
+    def frame(self, data: _Frame, index: int) -> Frame:
+        """One frame with its pictures, as ours."""
+        folder, place = self._folder, f"frames.{index}"
+        how = data.over(self._document)
+        rgb = read_rgb(folder / data.rgb)
+        height, width = rgb.shape[:2]
+        k = data.intrinsics
+        camera = Intrinsics(width, height, k.fx, k.fy, k.cx, k.cy)
+        raw, implied, file = read_depth(folder, data.depth)
+        unit = how.depth_unit or implied
+        if unit is None:
+            raise FileFormatError(
+                f"{file}: depth is whole numbers ({raw.dtype}): declare depth_unit (m, cm, mm or "
+                "the metres of one unit)"
+            )
+        try:
+            depth = z_depth(raw, camera, unit, how.depth_kind or "z")
+        except InputError as error:
+            raise FileFormatError(f"{file}: {error}") from error
+        if not bool((depth > 0).any()):
+            raise FileFormatError(f"{file}: depth is 0 everywhere, so nothing can be located")
+        masks = MaskFile.open(folder, data.masks, depth.shape)
+        detections = self._detections(data, place, how, masks, depth.shape)
+        with _located(folder, f"{place}.camera_to_world"):
+            axes = how.camera_axes or "opencv"
+            pose = camera_pose(data.camera_to_world, axes, self._document.up)
+            return Frame(rgb, depth, camera, pose, detections=detections)
+
+    def _detections(
+        self,
+        data: _Frame,
+        place: str,
+        how: _Conventions,
+        masks: MaskFile | None,
+        shape: tuple[int, ...],
+    ) -> tuple[Detection, ...]:
+        found: list[Detection] = []
+        used: set[int | str | None] = set()
+        alone = len(self._document.frames) == 1
+        for number, given in enumerate(data.detections):
+            where = f"{self._folder / OBSERVATION_FILE}: {place}.detections.{number}"
+            try:
+                category, instance = self._named(given, alone)
+                if any(instance is not None and d.instance == instance for d in found):
+                    raise InputError(f"instance {instance!r} occurs twice in this frame")
+                if given.states:
+                    self._tell(given.states, category, instance)
+            except UnknownNameError:
+                raise
+            except InputError as error:
+                raise FileFormatError(f"{where}: {error}") from error
+            source = given.id if given.id is not None else given.mask
+            if source in used:
+                raise FileFormatError(
+                    f"{where}: mask {source!r} belongs to another detection already"
+                )
+            used.add(source)
+            mask = _mask(self._folder, given, how, masks, where, shape)
+            found.append(Detection(category, mask, instance, given.score))
+        return tuple(found)
+
+    def _named(self, given: _Detection, alone: bool) -> tuple[str, str | None]:
+        """Category and instance of a detection, in the domain's words where it has them."""
+        names = self._names
+        category = names.words.category(given.category)
+        if given.instance is None:
+            if not alone:
+                return category, None
+            name = names.free(category, self._numbered)
+            self._numbered.add(name)
+            return category, name
+        other = category_of(given.instance)
+        if names.words.knows(other) and names.words.category(other) != category:
+            raise InputError(f"instance {given.instance!r} is not a {category}")
+        return category, names.instance(given.instance, category)
+
+    def _tell(self, given: Mapping[str, str], category: str, instance: str | None) -> None:
+        """Take down the states of a thing; of what the domain does not know it has none."""
+        if instance is None:
+            raise InputError(f"states need an instance, for example {category}-1")
+        if self._domain.find(category) is not None:
+            told = _states(given, category, self._domain)
+            self.states.setdefault(instance, {}).update(told)
 
 
 def _mask(
     folder: Path,
     given: _Detection,
+    how: _Conventions,
     masks: MaskFile | None,
     where: str,
     shape: tuple[int, ...],
-) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+) -> Mask:
     if (given.id is None) == (given.mask is None):
         raise FileFormatError(
             f"{where}: give either 'id' (its value in masks.png) or 'mask' "
             "(its name in masks.npz, or a PNG file)"
         )
+    kind = None if how.mask_kind == "ids" else how.mask_kind
     if given.mask is not None and given.mask.endswith(".png"):
-        mask = single_mask(folder / given.mask, shape)
+        mask = single_mask(folder / given.mask, shape, kind, how.mask_threshold)
     elif masks is None:
         raise FileFormatError(f"{where}: there is no masks.png and no masks.npz in {folder}")
     else:
-        mask = masks.of(given.id if given.id is not None else given.mask, where)
+        key = given.id if given.id is not None else given.mask
+        mask = masks.of(key, where, kind, how.mask_threshold)
     if not mask.any():
         raise FileFormatError(f"{where}: the mask of this {given.category} is empty")
     return mask
-
-
-def _instance(name: str, domain: Domain, where: str) -> str:
-    canonical = domain.canonical(name)
-    if domain.find(canonical) is None:
-        raise UnknownNameError("object category", category_of(name), domain.categories)
-    if not is_instance(canonical):
-        raise FileFormatError(f"{where}: {name!r} needs a number, for example {canonical}-1")
-    return canonical
-
-
-def _next_name(category: str, done: Sequence[Detection], given: Sequence[_Detection]) -> str:
-    taken = {d.instance for d in done} | {g.instance for g in given}
-    number = 1
-    while f"{category}-{number}" in taken:
-        number += 1
-    return f"{category}-{number}"
 
 
 def _states(given: Mapping[str, str], category: str, domain: Domain) -> dict[str, str]:

@@ -1,8 +1,13 @@
-"""Single files of a stored observation: colour, depth, masks. Called by `folder.py`."""
+"""Single files of a stored observation: colour, depth, masks. Called by `folder.py`.
+
+Units and kinds are as declared; `conventions.py` converts them.
+"""
 
 from __future__ import annotations
 
+import io
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,10 +16,12 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from forestall.errors import FileFormatError, PerceptionError
-from forestall.types.observation import Depth, Mask, Rgb
+from forestall.errors import FileFormatError, InputError
+from forestall.perception.conventions import MaskKind, mask_of
+from forestall.types.observation import Mask, Rgb
 
-MILLIMETRE_M = 0.001
+_GREY = ("I;16", "I;16B", "I;16L", "I")
+_OPAQUE = 255
 
 
 def _image(file: Path) -> Image.Image:
@@ -32,7 +39,7 @@ def _array(file: Path) -> Any:
     if not file.is_file():
         raise FileFormatError(f"{file} is missing")
     try:
-        return np.load(file, allow_pickle=False)
+        return np.load(io.BytesIO(file.read_bytes()), allow_pickle=False)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise FileFormatError(f"{file} cannot be read as a numpy file: {error}") from error
 
@@ -42,13 +49,12 @@ def read_rgb(file: Path) -> Rgb:
     return np.asarray(_image(file).convert("RGB"), dtype=np.uint8)
 
 
-def read_depth(folder: Path, name: str | None, shape: tuple[int, ...]) -> Depth:
-    """(H, W) float32 metres, from float .npy (metres) or 16-bit .png (millimetres).
+def read_depth(folder: Path, name: str | None) -> tuple[npt.NDArray[Any], str | None, Path]:
+    """Raw depth, the unit that its file implies (None: it must be declared), and the file.
 
     Args:
         folder: where the file is.
         name: its name; None: depth.npy, or depth.png where there is none.
-        shape: (H, W) of the colour picture.
     """
     if name is None:
         options = [f for f in ("depth.npy", "depth.png") if (folder / f).is_file()]
@@ -56,62 +62,64 @@ def read_depth(folder: Path, name: str | None, shape: tuple[int, ...]) -> Depth:
             raise FileFormatError(f"{folder} has neither depth.npy nor depth.png")
         name = options[0]
     file = folder / name
-    depth = _depth_png(file) if file.suffix == ".png" else _depth_npy(file)
-    if depth.shape != tuple(shape):
-        raise PerceptionError(
-            f"{file}: shape {depth.shape} does not fit the colour picture's {tuple(shape)}"
-        )
-    if not bool(np.isfinite(depth).all()):
-        bad = int((~np.isfinite(depth)).sum())
-        raise PerceptionError(
-            f"{file}: {bad} NaN or infinite values; write 0 where nothing returned"
-        )
-    if bool((depth < 0).any()):
-        raise PerceptionError(f"{file}: negative depth; z-depth is metres in front of the camera")
-    if not bool((depth > 0).any()):
-        raise PerceptionError(f"{file}: depth is 0 everywhere, so nothing can be located")
-    return depth
-
-
-def _depth_png(file: Path) -> Depth:
-    image = _image(file)
-    if image.mode not in ("I;16", "I;16B", "I"):
-        raise PerceptionError(
-            f"{file}: depth as PNG must be 16-bit grey in millimetres, this is {image.mode!r}"
-        )
-    return (np.asarray(image).astype(np.float32) * np.float32(MILLIMETRE_M)).astype(np.float32)
-
-
-def _depth_npy(file: Path) -> Depth:
+    if file.suffix != ".npy":
+        image = _image(file)
+        if image.mode not in _GREY:
+            raise FileFormatError(
+                f"{file}: depth as PNG must be 16-bit grey, this is {image.mode!r}"
+            )
+        return np.asarray(image), "mm", file
     array = _array(file)
-    if not isinstance(array, np.ndarray) or array.dtype not in (np.float32, np.float64):
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         kind = getattr(array, "dtype", type(array).__name__)
-        raise PerceptionError(f"{file}: depth must be float32 or float64 metres, this is {kind}")
-    return array.astype(np.float32)
+        raise FileFormatError(f"{file}: depth must be numbers, this is {kind}")
+    return array, "m" if array.dtype.kind == "f" else None, file
 
 
-def single_mask(file: Path, shape: tuple[int, ...]) -> Mask:
-    """(H, W) bool: where a picture is not black."""
-    mask = np.asarray(_image(file).convert("L")) > 0
-    return _fitting(mask, shape, f"{file}")
+def single_mask(
+    file: Path, shape: tuple[int, ...], kind: MaskKind | None, threshold: float | None
+) -> Mask:
+    """(H, W) bool from a picture of one thing.
+
+    The alpha channel where there is one that says something; else grey; else what is not black.
+    """
+    image = _image(file)
+    if image.mode in ("RGBA", "LA", "PA"):
+        alpha = np.asarray(image.convert("RGBA"))[:, :, 3]
+        if kind == "alpha" or int(alpha.min()) < _OPAQUE:
+            return _mask(alpha, shape, f"{file} (alpha)", kind, threshold)
+        image = image.convert("RGB")
+    elif kind == "alpha":
+        raise FileFormatError(f"{file}: mask_kind is alpha, and the picture has no alpha channel")
+    grey = image.mode in ("L", *_GREY)
+    raw = np.asarray(image if grey else image.convert("RGB").convert("L"))
+    return _mask(raw, shape, f"{file}", kind if grey else "bool", threshold)
 
 
-def _fitting(mask: npt.NDArray[Any], shape: tuple[int, ...], where: str) -> Mask:
-    if mask.shape != tuple(shape):
-        raise PerceptionError(
-            f"{where}: mask shape {mask.shape} does not fit the depth's {tuple(shape)}"
-        )
-    return mask.astype(np.bool_)
+def _mask(
+    raw: npt.NDArray[Any],
+    shape: tuple[int, ...],
+    where: str,
+    kind: MaskKind | None,
+    threshold: float | None,
+) -> Mask:
+    try:
+        return mask_of(raw, shape, kind, threshold)
+    except InputError as error:
+        raise FileFormatError(f"{where}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaskFile:
-    """masks.png (one id a pixel, 0 for none) or masks.npz (one array a name)."""
+    """One id a pixel (masks.png, a TIFF or .npy of whole numbers), or masks.npz, one array a name.
+
+    Arrays of an .npz are read one by one when they are asked for.
+    """
 
     file: Path
     shape: tuple[int, ...]
     ids: npt.NDArray[np.int64] | None
-    arrays: dict[str, npt.NDArray[Any]]
+    arrays: Any = None
 
     @classmethod
     def open(cls, folder: Path, name: str | None, shape: tuple[int, ...]) -> MaskFile | None:
@@ -124,21 +132,37 @@ class MaskFile:
         file = folder / name
         if file.suffix == ".npz":
             loaded = _array(file)
-            return cls(file, tuple(shape), None, {k: loaded[k] for k in loaded.files})
-        image = _image(file)
-        if image.mode not in ("L", "P", "I;16", "I;16B", "I"):
-            raise FileFormatError(
-                f"{file}: ids must be an 8-bit or 16-bit grey or palette PNG, not {image.mode!r}"
-            )
-        ids = np.asarray(image).astype(np.int64)
+            if not hasattr(loaded, "files"):
+                raise FileFormatError(f"{file} is no .npz archive")
+            return cls(file, tuple(shape), None, loaded)
+        if file.suffix == ".npy":
+            raw = _array(file)
+            if raw.dtype.kind not in "iu":
+                raise FileFormatError(f"{file}: ids must be whole numbers, this is {raw.dtype}")
+        else:
+            image = _image(file)
+            if image.mode not in ("L", "P", *_GREY):
+                raise FileFormatError(
+                    f"{file}: ids must be one number a pixel, this is a picture of mode "
+                    f"{image.mode!r}. For ids coded in colour write r + 256 * g + 65536 * b as a "
+                    "32-bit .tif or an .npy of whole numbers"
+                )
+            raw = np.asarray(image)
+        ids = raw.astype(np.int64)
         if ids.shape != tuple(shape):
-            raise PerceptionError(
-                f"{file}: mask shape {ids.shape} does not fit the depth's {tuple(shape)}"
+            raise FileFormatError(
+                f"{file}: mask shape {ids.shape} does not fit the picture's {tuple(shape)}"
             )
-        return cls(file, tuple(shape), ids, {})
+        return cls(file, tuple(shape), ids)
 
-    def of(self, key: int | str | None, where: str) -> Mask:
-        """The mask with an id (PNG) or a name (npz)."""
+    def of(
+        self,
+        key: int | str | None,
+        where: str,
+        kind: MaskKind | None = None,
+        threshold: float | None = None,
+    ) -> Mask:
+        """The mask with an id (a picture) or a name (npz)."""
         if isinstance(key, int):
             if self.ids is None:
                 raise FileFormatError(f"{where}: 'id' needs masks.png, there is {self.file.name}")
@@ -146,7 +170,14 @@ class MaskFile:
             return mask
         if self.ids is not None:
             raise FileFormatError(f"{where}: 'mask' needs masks.npz, there is {self.file.name}")
-        if key not in self.arrays:
-            known = ", ".join(sorted(self.arrays)) or "none"
+        if key not in self.arrays.files:
+            known = ", ".join(sorted(self.arrays.files)[:8]) or "none"
             raise FileFormatError(f"{where}: {self.file} has no array {key!r}; it has {known}")
-        return _fitting(self.arrays[key], self.shape, f"{where}: {self.file}")
+        try:
+            raw = self.arrays[key]
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
+            raise FileFormatError(
+                f"{where}: {self.file}: {key} cannot be read ({error}): save bool or numbers, "
+                "not Python objects"
+            ) from error
+        return _mask(raw, self.shape, f"{where}: {self.file}", kind, threshold)

@@ -17,7 +17,7 @@ from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.relations import directions
-from forestall.perception.sightings import gather, in_hand, placing, readings
+from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
 from forestall.perception.support import Parent, parents
 from forestall.perception.tracks import (
     Fate,
@@ -26,15 +26,18 @@ from forestall.perception.tracks import (
     View,
     expected_pixels,
     fates,
+    gap_m,
     interior_observed,
+    middle,
+    thinned,
+    vec,
 )
 from forestall.perception.unproject import Points, robust_box
-from forestall.types.facts import GRIPPER, Truth, category_of
+from forestall.types.facts import Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
 
 _STILL_M = 0.03
-_MOST_POINTS = 6000
 
 
 class SceneMemory:
@@ -50,7 +53,7 @@ class SceneMemory:
         """Forget everything."""
         self.tracks: dict[str, Track] = {}
         self._held: str | None = None
-        self._hand_m: Vec3 = (0.0, 0.0, 0.0)
+        self._hands: tuple[GripperState, ...] = ()
         self._relations: list[Relation] = []
 
     # --- integration ----------------------------------------------------------------------------
@@ -59,12 +62,14 @@ class SceneMemory:
         """Take in one observation: all its views show the world at one time."""
         before = [self.tracks[i] for i in sorted(self.tracks)]
         fate = fates(before, views, self._config)
-        former, self._held = self._held, observation.gripper.holding
-        self._hand_m = observation.gripper.position_world_m
-        places = {t.id: _middle(t) for t in before if t.points_world_m is not None}
+        self._hands = observation.hands
+        former = self._held
+        self._held = observation.gripper.holding if observation.gripper.told else None
+        places = {t.id: middle(t) for t in before if t.points_world_m is not None}
         seen = self._take_in(views, fate, observation.time_s)
-        if self._held is not None:
-            self._hold(self._held, seen)
+        for hand in self._hands:
+            if hand.holding is not None:
+                self._hold(hand.holding, hand.position_world_m, seen)
         put = self._put_down(observation.gripper, seen)
         moved = put | self._carry(places, seen | put)
         if former is not None and former != self._held and former not in seen | put:
@@ -97,7 +102,21 @@ class SceneMemory:
             track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
                 track.feature = sighting.feature or track.feature
+        self._take_note(views, time_s)
         return set(shown)
+
+    def _take_note(self, views: Sequence[View], time_s: float) -> None:
+        """Things that are seen and have no place: their names and states are known, no more."""
+        for track in self.tracks.values():
+            track.vague = track.vague and track.points_world_m is None
+        for name, (view, label) in sorted(unlocated(views).items()):
+            track = self.tracks.setdefault(
+                name, Track(name, view.categories[label], first_seen_s=time_s)
+            )
+            track.vague = track.points_world_m is None
+            track.pixels = int(np.count_nonzero(view.labels == label))
+            track.last_seen_s = time_s
+            track.states.update((a, v) for a, v in view.states[label].items() if v is not None)
 
     def _riding(self, name: str | None) -> set[str]:
         """What is in or on a thing, at any depth."""
@@ -120,7 +139,7 @@ class SceneMemory:
             track.unmoved = fixture or self._unmoved(track, fate)
             if track.unmoved:
                 fresh = np.concatenate([fresh, kept])
-        track.points_world_m = _thinned(fresh, voxel)
+        track.points_world_m = thinned(fresh, voxel)
         track.low_m, track.high_m = robust_box(track.points_world_m, self._config.box_percentile)
         track.centroid_m = track.points_world_m.mean(axis=0)
 
@@ -131,19 +150,19 @@ class SceneMemory:
         still = agree >= self._config.unmoved_share * (agree + differ)
         return agree > 0 and still and track.id != self._held
 
-    def _hold(self, held: str, seen: set[str]) -> None:
+    def _hold(self, held: str, hand_m: Vec3, seen: set[str]) -> None:
         track = self.tracks.get(held)
         if track is None:
             track = Track(held, category_of(self._domain.canonical(held)))
             self.tracks[held] = track
         track.parent = None
         if held not in seen:
-            hand = np.asarray(self._hand_m, dtype=np.float64)
+            hand = np.asarray(hand_m, dtype=np.float64)
             if track.points_world_m is None:
                 track.points_world_m = hand[None, :]
                 track.low_m = track.high_m = track.centroid_m = hand
             else:
-                track.move(hand - _middle(track))
+                track.move(hand - middle(track))
 
     def _put_down(self, gripper: GripperState, seen: set[str]) -> set[str]:
         """What the arm let go is where it let go, even where no view shows it."""
@@ -153,14 +172,14 @@ class SceneMemory:
         place = np.asarray(gripper.released_world_m, dtype=np.float64)
         if track.points_world_m is None:
             return set()
-        track.move(place - _middle(track))
+        track.move(place - middle(track))
         return {track.id}
 
     def _carry(self, places: Mapping[str, Points], seen: set[str]) -> set[str]:
         """Move what rests in or on something that moved; returns what was moved unseen."""
         moved: set[str] = set()
         pending = [
-            (name, _middle(t) - places[name])
+            (name, middle(t) - places[name])
             for name, t in sorted(self.tracks.items())
             if name in places
             and t.points_world_m is not None
@@ -199,9 +218,10 @@ class SceneMemory:
         moved: set[str],
         views: Sequence[View],
     ) -> None:
+        held = {h.holding for h in self._hands}
         enough = self._config.expected_pixels * self._config.min_pixels
         for name, track in sorted(self.tracks.items()):
-            spared = name in seen or name in moved or name == self._held
+            spared = name in seen or name in moved or name in held
             if spared or name not in fate or self._is_fixture(track.category):
                 continue
             if track.points_world_m is None or self._shut_in(track):
@@ -224,7 +244,7 @@ class SceneMemory:
             if not pieces:
                 continue
             gone = track.points_world_m is None or bool(np.any(fate.get(name, 0) == Fate.GONE))
-            near = any(_gap_m(track, p) <= self._config.same_place_m for p in pieces)
+            near = any(gap_m(track, p) <= self._config.same_place_m for p in pieces)
             if gone and (near or name == former or track.points_world_m is None):
                 self._remove(name)
 
@@ -245,18 +265,24 @@ class SceneMemory:
             ]
         )
         homeless = {n for n, t in self.tracks.items() if t.parent is None and n not in seen}
-        subjects = (seen | homeless) - {self._held}
+        held = {h.holding for h in self._hands if h.holding is not None}
+        subjects = (seen | homeless) - held
         found = parents(stack, subjects, self._domain, self._config)
         for name in sorted(subjects):
             track = self.tracks[name]
             track.parent = found.get(name) or self._former_parent(track)
         links = {n: t.parent for n, t in self.tracks.items() if t.parent is not None}
         relations = [Relation(n, predicate, r) for n, (predicate, r) in links.items()]
-        if self._held is not None and self._domain.roles.holding is not None:
-            relations.append(Relation(self._held, self._domain.roles.holding, GRIPPER))
-        camera = views[-1].frame.camera_to_world
+        if self._domain.roles.holding is not None:
+            relations += [
+                Relation(h.holding, self._domain.roles.holding, h.name)
+                for h in self._hands
+                if h.holding is not None
+            ]
+        newest = [v for v in views if not v.frame.colour_only] or views
+        camera = newest[-1].frame.camera_to_world
         skip = {n for n, t in self.tracks.items() if self._is_large_support(t.category)}
-        skip |= {self._held} if self._held is not None else set()
+        skip |= held
         tied = [(n, r) for n, (_, r) in links.items()]
         relations += directions(stack, camera, skip, tied, self._config)
         eye = (float(camera[0, 3]), float(camera[1, 3]), float(camera[2, 3]))
@@ -275,7 +301,7 @@ class SceneMemory:
         parent = self.tracks[track.parent[1]]
         if parent.points_world_m is None:
             return None
-        close = track.unmoved or _gap_m(track, parent) <= self._config.ring_m
+        close = track.unmoved or gap_m(track, parent) <= self._config.ring_m
         return track.parent if close else None
 
     def _cut_shares(self, views: Sequence[View]) -> dict[tuple[str, str], float]:
@@ -296,26 +322,31 @@ class SceneMemory:
                     track.interior_seen = False
                 elif shut is Truth.FALSE and name in seen:
                     track.interior_seen |= interior_observed(track, views, self._config)
+        held = {h.holding for h in self._hands}
+        noted = {n for n in unlocated(views) if self.tracks[n].vague}
         for name, track in self.tracks.items():
             codes = fate.get(name)
-            if name in seen:
+            if name in seen or name in noted:
                 track.seen = Seen.VISIBLE
             else:
                 covered = codes is not None and float((codes == Fate.OCCLUDED).mean()) > 0.5
                 lost = track.points_world_m is None
                 out_of_sight = lost or covered or self._shut_in(track)
                 track.seen = Seen.UNOBSERVED if out_of_sight else Seen.REMEMBERED
-            if name == self._held and name not in seen:
+            if name in held and name not in seen:
                 track.seen = Seen.REMEMBERED
 
     def graph(self) -> SceneGraph:
         """The scene as believed now."""
         nodes = [self._node(t) for t in self.tracks.values()]
-        nodes.append(ObjectNode(GRIPPER, "Gripper", centroid_m=_vec(np.asarray(self._hand_m))))
+        nodes += [
+            ObjectNode(h.name, "Gripper", centroid_m=vec(np.asarray(h.position_world_m)))
+            for h in self._hands
+        ]
         hidden = [
             n
             for n, t in self.tracks.items()
-            if self._domain.encloses(t.category) and not t.interior_seen
+            if t.vague or (self._domain.encloses(t.category) and not t.interior_seen)
         ]
         return SceneGraph(tuple(nodes), tuple(self._relations), hidden=tuple(hidden))
 
@@ -328,8 +359,8 @@ class SceneMemory:
             id=track.id,
             category=track.category,
             states=tuple(states.items()),
-            centroid_m=_vec(track.centroid_m) if located else None,
-            box_m=Box(_vec(track.low_m), _vec(track.high_m)) if located else None,
+            centroid_m=vec(track.centroid_m) if located else None,
+            box_m=Box(vec(track.low_m), vec(track.high_m)) if located else None,
             seen=track.seen,
             pixels=track.pixels,
             last_seen_s=track.last_seen_s,
@@ -358,30 +389,3 @@ class SceneMemory:
                 return True
             passed.add(track.id)
         return False
-
-
-def _middle(track: Track) -> Points:
-    middle: Points = (track.low_m + track.high_m) / 2
-    return middle
-
-
-def _gap_m(one: Track, other: Track) -> float:
-    """Distance between two boxes."""
-    apart = np.maximum(one.low_m - other.high_m, other.low_m - one.high_m)
-    return float(np.linalg.norm(np.maximum(apart, 0.0)))
-
-
-def _thinned(points: Points, voxel_m: float) -> Points:
-    """One point for each voxel (the first, that is the newest), at most a fixed number."""
-    cell = np.floor(points / voxel_m).astype(np.int64) + (1 << 19)
-    key = (cell[:, 0] << 40) | (cell[:, 1] << 20) | cell[:, 2]
-    _, first = np.unique(key, return_index=True)
-    if len(first) > _MOST_POINTS:
-        first = first[np.linspace(0, len(first) - 1, _MOST_POINTS).astype(np.int64)]
-    thinned: Points = points[first]
-    return thinned
-
-
-def _vec(values: Points) -> Vec3:
-    x, y, z = (round(float(v), 4) for v in values)
-    return (x, y, z)

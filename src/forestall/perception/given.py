@@ -8,7 +8,7 @@ from forestall.types.observation import Detection, Frame
 
 
 class GivenStateEstimator:
-    """Hands on states by instance name; nothing is known of other instances.
+    """Hands on states by instance name, and those that a detection brings with it.
 
     Args:
         states: instance name → attribute → value; read anew at every frame.
@@ -23,4 +23,4 @@ class GivenStateEstimator:
         self, frame: Frame, detections: Sequence[Detection]
     ) -> Sequence[Mapping[str, str | None]]:
         """See the Protocol."""
-        return [dict(self._states.get(d.instance or "", {})) for d in detections]
+        return [dict(self._states.get(d.instance or "", {})) | dict(d.states) for d in detections]

@@ -1,27 +1,39 @@
 """The perceiver: images, depth, masks and the hand in, one fused scene graph out.
 
 Called by the runtime; calls a segmenter, a state estimator and, where there is one, an image
-encoder (given by the constructor), then `unproject.py` for each frame and `fuse.py` once for each
-observation.
+encoder (given by the constructor), `gate.py` before anything is believed, then `unproject.py` for
+each frame and `fuse.py` once for each observation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.fuse import SceneMemory
+from forestall.perception.gate import Masks, inspect
+from forestall.perception.gate_config import GateConfig
 from forestall.perception.naming import name_detections
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
-from forestall.perception.unproject import Cloud, Points, clouds, label_image
+from forestall.perception.unproject import (
+    Cloud,
+    Labels,
+    Points,
+    clouds,
+    label_image,
+)
 from forestall.seams import ImageEncoder, Segmenter, StateEstimator
+from forestall.types.facts import category_of
 from forestall.types.feature import quantised
+from forestall.types.finding import Finding, refuse
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame, Observation
 from forestall.types.plan import Subtask
+
+_GATE = GateConfig()
 
 
 class GraphPerceiver:
@@ -35,6 +47,7 @@ class GraphPerceiver:
         scope_config: what a subtask's graph keeps.
         image_encoder: gives every located thing the feature of its largest crop (f(v) of Eq. 1 as
             an image embedding); without it nodes have none.
+        gate: what observations cannot be; None lets everything in.
     """
 
     def __init__(
@@ -46,6 +59,7 @@ class GraphPerceiver:
         scope_config: ScopeConfig | None = None,
         *,
         image_encoder: ImageEncoder | None = None,
+        gate: GateConfig | None = _GATE,
     ) -> None:
         self._segmenter = segmenter
         self._estimator = state_estimator
@@ -53,18 +67,24 @@ class GraphPerceiver:
         self._config = config or PerceptionConfig()
         self._scope = scope_config or ScopeConfig()
         self._image_encoder = image_encoder
+        self._gate = gate
+        self.findings: tuple[Finding, ...] = ()
         self._memory = SceneMemory(domain, self._config)
 
     def reset(self) -> None:
         """Forget everything."""
         self._memory.reset()
+        self.findings = ()
 
     def perceive(self, observation: Observation) -> SceneGraph:
         """Fuse an observation and return the whole graph as believed now.
 
+        What the gate found of it stands in `findings`.
+
         Raises:
             PerceptionError: no frame at all, one without the masks that the segmenter needs, a
                 state estimator or an image encoder that does not answer for every detection.
+            ObservationError: the gate refuses it; nothing of it was taken in.
         """
         if not observation.frames:
             raise PerceptionError(
@@ -74,8 +94,8 @@ class GraphPerceiver:
             n: t.centroid_m for n, t in self._memory.tracks.items() if t.points_world_m is not None
         }
         views = []
-        for frame in observation.frames:
-            view = self._view(frame, known)
+        for frame, masks in zip(observation.frames, self._masks(observation), strict=True):
+            view = self._view(frame, masks, known)
             for name, cloud in zip(view.ids, view.clouds, strict=True):
                 if cloud is not None:
                     known[name] = cloud.centroid_m
@@ -97,16 +117,34 @@ class GraphPerceiver:
             used["features"] = self._image_encoder.name
         return used
 
-    def _view(self, frame: Frame, known: Mapping[str, Points]) -> View:
-        detections = self._segmenter.segment(frame)
+    def _masks(self, observation: Observation) -> list[Masks]:
+        """What the segmenter finds in each frame, once the gate has let it in."""
+        masks = []
+        for frame in observation.frames:
+            found = self._segmenter.segment(frame)
+            masks.append(Masks(found, label_image(found, frame.depth_m.shape)))
+        if self._gate is not None:
+            self.findings = inspect(observation, self._domain, self._gate, masks)
+            refuse(self.findings)
+        return masks
+
+    def _view(self, frame: Frame, masks: Masks, known: Mapping[str, Points]) -> View:
+        detections, labels = masks.detections, masks.labels
         states = self._estimator.estimate(frame, detections)
         if len(states) != len(detections):
             raise PerceptionError(
                 f"the state estimator {self._estimator.name!r} answered for {len(states)} of "
                 f"{len(detections)} detections"
             )
-        labels = label_image(detections, frame.depth_m.shape)
-        found = clouds(frame, labels, [self._voxel_m(d) for d in detections], self._config)
+        fixed = [self._domain.is_a(d.category, self._domain.roles.fixture) for d in detections]
+        voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in fixed]
+        found = clouds(frame, labels, voxel_m, self._config, [not f for f in fixed])
+        if self._gate is not None:
+            least = self._gate.least_score
+            found = [
+                None if d.score < least else cloud
+                for d, cloud in zip(detections, found, strict=True)
+            ]
         names = name_detections(detections, found, known, self._config.same_place_m)
         return View(
             frame=frame,
@@ -116,6 +154,7 @@ class GraphPerceiver:
             clouds=tuple(found),
             states=tuple(states),
             features=self._features(frame, detections, found),
+            unlocated=tuple(_placeless(frame, detections, labels, found, known)),
         )
 
     def _features(
@@ -140,7 +179,22 @@ class GraphPerceiver:
             raise PerceptionError(f"the image encoder {encoder.name!r}: {error}") from error
         return tuple(features)
 
-    def _voxel_m(self, detection: Detection) -> float:
-        if self._domain.is_a(detection.category, self._domain.roles.fixture):
-            return self._config.fixture_voxel_m
-        return self._config.voxel_m
+
+def _placeless(
+    frame: Frame,
+    detections: Sequence[Detection],
+    labels: Labels,
+    found: Sequence[Cloud | None],
+    known: Mapping[str, Points],
+) -> Iterator[bool]:
+    """Which detections show something that cannot be located, and that is not known already.
+
+    One without an instance name may well be what was located before.
+    """
+    near = {category_of(n) for n in known}
+    for label, (detection, cloud) in enumerate(zip(detections, found, strict=True)):
+        if cloud is not None or (detection.instance is None and detection.category in near):
+            yield False
+        else:
+            dark = not bool((frame.depth_m[labels == label] > 0).any())
+            yield dark or detection.score < _GATE.least_score

@@ -40,6 +40,19 @@ def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
     return found
 
 
+def unlocated(views: Sequence[View]) -> dict[str, tuple[View, int]]:
+    """What views show and none locates: the view that shows it largest, and its label there."""
+    located = gather(views)
+    found: dict[str, tuple[int, View, int]] = {}
+    for view in views:
+        for label, name in enumerate(view.ids):
+            if view.unlocated[label] and name not in located:
+                pixels = int(np.count_nonzero(view.labels == label))
+                if name not in found or pixels > found[name][0]:
+                    found[name] = (pixels, view, label)
+    return {name: (view, label) for name, (_, view, label) in found.items()}
+
+
 def readings(sightings: Sequence[Sighting], share: float) -> dict[str, str]:
     """What one observation says about a thing's states; the larger the view, the more it counts.
 

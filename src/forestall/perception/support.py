@@ -87,8 +87,16 @@ def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> P
 
 
 def _takes(domain: Domain, receptacle: str, thing: str) -> bool:
-    known = domain.find(receptacle) is not None and domain.find(thing) is not None
-    return known and domain.offers(receptacle) is not None and domain.accepts(receptacle, thing)
+    """Whether a thing can be in or on another, by rule; within walls only points count.
+
+    A book in an oven is in it, whether or not it belongs there.
+    """
+    offered = domain.offers(receptacle)
+    if domain.find(receptacle) is None or offered is None:
+        return False
+    walls = domain.predicates[offered].geometry == CONTAINMENT
+    anything = domain.find(thing) is None or walls
+    return anything or domain.accepts(receptacle, thing)
 
 
 def _touching(stack: Stack, a: int, config: PerceptionConfig) -> list[int]:

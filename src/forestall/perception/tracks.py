@@ -16,7 +16,7 @@ from forestall.perception.config import PerceptionConfig
 from forestall.perception.support import Parent
 from forestall.perception.unproject import Cloud, Labels, Points, project
 from forestall.types.graph import Seen
-from forestall.types.observation import Frame
+from forestall.types.observation import Frame, Vec3
 
 
 @dataclass(slots=True)
@@ -24,7 +24,7 @@ class Track:
     """One object as believed now; `points_world_m` is None when its place is not known.
 
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
-    view that showed it showed it where it was before.
+    view that showed it showed it where it was before, `vague` that it was seen and never located.
     """
 
     id: str
@@ -42,6 +42,7 @@ class Track:
     parent: Parent | None = None
     interior_seen: bool = False
     unmoved: bool = False
+    vague: bool = False
 
     def move(self, offset_m: Points) -> None:
         """Shift everything that is remembered of its place."""
@@ -61,7 +62,8 @@ class Track:
 class View:
     """One frame with what was found in it; everything but the frame and `labels` by label.
 
-    `features` are None without an image encoder and for what has no cloud.
+    `features` are None without an image encoder and for what has no cloud. `unlocated` tells what
+    is seen and has no place, because no depth returned or the segmenter is not sure of its mask.
     """
 
     frame: Frame
@@ -71,6 +73,10 @@ class View:
     clouds: tuple[Cloud | None, ...]
     states: tuple[Mapping[str, str | None], ...]
     features: tuple[bytes | None, ...]
+    unlocated: tuple[bool, ...]
+
+
+_MOST_POINTS = 6000
 
 
 class Fate(IntEnum):
@@ -154,3 +160,32 @@ def interior_observed(track: Track, views: Sequence[View], config: PerceptionCon
         if float(open_view.mean()) >= config.interior_share:
             return True
     return False
+
+
+def middle(track: Track) -> Points:
+    """Midpoint of a track's box."""
+    centre: Points = (track.low_m + track.high_m) / 2
+    return centre
+
+
+def gap_m(one: Track, other: Track) -> float:
+    """Distance between two boxes."""
+    apart = np.maximum(one.low_m - other.high_m, other.low_m - one.high_m)
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
+
+
+def thinned(points: Points, voxel_m: float) -> Points:
+    """One point for each voxel (the first, that is the newest), at most a fixed number."""
+    cell = np.floor(points / voxel_m).astype(np.int64) + (1 << 19)
+    key = (cell[:, 0] << 40) | (cell[:, 1] << 20) | cell[:, 2]
+    _, first = np.unique(key, return_index=True)
+    if len(first) > _MOST_POINTS:
+        first = first[np.linspace(0, len(first) - 1, _MOST_POINTS).astype(np.int64)]
+    kept: Points = points[first]
+    return kept
+
+
+def vec(values: Points) -> Vec3:
+    """Three numbers, rounded to a tenth of a millimetre."""
+    x, y, z = (round(float(v), 4) for v in values)
+    return (x, y, z)

@@ -86,7 +86,11 @@ def project(
 
 
 def clouds(
-    frame: Frame, labels: Labels, voxel_m: Sequence[float], config: PerceptionConfig
+    frame: Frame,
+    labels: Labels,
+    voxel_m: Sequence[float],
+    config: PerceptionConfig,
+    in_one_piece: Sequence[bool] = (),
 ) -> list[Cloud | None]:
     """One cloud for each detection (None where no depth returned under its mask).
 
@@ -95,6 +99,8 @@ def clouds(
         labels: (H, W) index of the detection at each pixel, -1 for none.
         voxel_m: edge of the thinning grid for each detection.
         config: thresholds.
+        in_one_piece: for each detection, whether points far apart along the line of sight cannot
+            all be its own; no one if left out.
     """
     count = len(voxel_m)
     flat = labels.ravel()
@@ -113,10 +119,30 @@ def clouds(
         if len(own) == 0:
             result.append(None)
             continue
+        worth_px = weights[starts[i] : starts[i + 1]]
+        if in_one_piece and in_one_piece[i]:
+            kept = _own(own, worth_px, frame.camera_to_world[:3, 3], config)
+            own, worth_px = own[kept], worth_px[kept]
         low, high = robust_box(own, config.box_percentile)
-        centroid = np.average(own, axis=0, weights=weights[starts[i] : starts[i + 1]])
+        centroid = np.average(own, axis=0, weights=worth_px)
         result.append(Cloud(own, low, high, centroid, int(pixels[i])))
     return result
+
+
+def _own(
+    points: Points, weights: Points, eye_world_m: Points, config: PerceptionConfig
+) -> npt.NDArray[np.bool_]:
+    """Which points of a thing of one piece are its own, and not far before or behind it.
+
+    Where a mask is a pixel too wide, it shows a little of what is behind.
+    """
+    away = np.linalg.norm(points - eye_world_m, axis=1)
+    order = np.argsort(away, kind="stable")
+    part = np.empty(len(away), dtype=np.int64)
+    part[order] = np.cumsum(np.diff(away[order], prepend=away[order[0]]) > config.stray_gap_m)
+    share = np.bincount(part, weights=weights) / weights.sum()
+    own: npt.NDArray[np.bool_] = (share >= min(config.stray_share, float(share.max())))[part]
+    return own
 
 
 def robust_box(points_m: Points, share: float) -> tuple[Points, Points]:

@@ -114,6 +114,7 @@ class SceneGraph:
         relations: edges between nodes; what is held has one to the hand.
         subtask: the subtask that this graph was made for.
         hidden: ids of containers whose inside no view could reach; what is in them is unobserved.
+            Also of things in sight that nothing locates: where they are is unobserved, too.
 
     Raises:
         InputError: an id twice, an edge to a node that is not there.

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import PerceptionError
+from forestall.types.facts import GRIPPER
 
 if TYPE_CHECKING:
     from forestall.types.graph import SceneGraph
@@ -46,13 +47,17 @@ class Detection:
     """One instance mask: what a segmenter found.
 
     `mask` is (H, W) bool. `instance` is a name that stays the same over frames when the segmenter
-    tracks instances (for example "Mug-1"), otherwise None. `score` is in [0, 1].
+    tracks instances (for example "Mug-1"), otherwise None. `score` is in [0, 1]. `outlined` is
+    False for a mask that was made of a box: where the thing ends is not known. `states` are
+    (attribute, value) that whoever found it knows of it.
     """
 
     category: str
     mask: Mask
     instance: str | None = None
     score: float = 1.0
+    outlined: bool = True
+    states: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +74,8 @@ class Frame:
             categories of what is in view and no state of it.
         instance_names: instance names such as "Mug-1", by index.
         detections: masks that came with the frame from outside, if any.
+        colour_only: nothing measured depth; `depth_m` is 0 everywhere, and whatever needs depth is
+            unobserved.
 
     Raises:
         PerceptionError: a shape, type or value that cannot be used.
@@ -81,6 +88,7 @@ class Frame:
     instance_ids: npt.NDArray[np.int32] | None = None
     instance_names: tuple[str, ...] = ()
     detections: tuple[Detection, ...] | None = None
+    colour_only: bool = False
 
     def __post_init__(self) -> None:
         size = (self.intrinsics.height, self.intrinsics.width)
@@ -104,6 +112,12 @@ class Frame:
         rotation = self.camera_to_world[:3, :3]
         if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
             raise PerceptionError("camera_to_world has no rotation matrix in its upper left")
+        if float(np.linalg.det(rotation)) < 0:
+            raise PerceptionError(
+                "camera_to_world is left-handed: a mirror image of the world, not a turn of it"
+            )
+        if self.colour_only and bool(self.depth_m.any()):
+            raise PerceptionError("a frame of colour alone has depth_m 0 everywhere")
         if self.instance_ids is not None and self.instance_ids.shape != size:
             raise PerceptionError(f"instance_ids must be {size}, got {self.instance_ids.shape}")
         for d in self.detections or ():
@@ -121,12 +135,21 @@ class GripperState:
     `holding` is the instance name of what is held as the robot knows it, None for an empty hand.
     `position_world_m` is where the hand is. `released` is what the subtask just executed let go on
     purpose, `released_world_m` where: the arm knows it, whether or not the camera sees it.
+    `name` is the hand's node in the graph, one of the domain's hands. `told` is False for a robot
+    without a hand, or one that does not tell: then nothing is known of what it holds.
     """
 
     holding: str | None
     position_world_m: Vec3
     released: str | None = None
     released_world_m: Vec3 | None = None
+    name: str = GRIPPER
+    told: bool = True
+
+    @classmethod
+    def untold(cls) -> GripperState:
+        """No hand, or none that tells."""
+        return cls(None, (0.0, 0.0, 0.0), told=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +162,7 @@ class Observation:
         time_s: of the world's clock.
         robot_position_world_m: where the robot stands.
         graph: what is in view as a scene graph, from a source that needs no pictures.
+        others: further hands.
 
     Raises:
         PerceptionError: neither a frame nor a graph.
@@ -149,7 +173,16 @@ class Observation:
     time_s: float
     robot_position_world_m: Vec3 = (0.0, 0.0, 0.0)
     graph: SceneGraph | None = None
+    others: tuple[GripperState, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.frames and self.graph is None:
             raise PerceptionError("an observation needs at least one frame, or a scene graph")
+        names = [hand.name for hand in self.hands]
+        if len(set(names)) != len(names):
+            raise PerceptionError(f"two hands have the same name: {', '.join(names)}")
+
+    @property
+    def hands(self) -> tuple[GripperState, ...]:
+        """Every hand that tells, the first one first."""
+        return tuple(hand for hand in (self.gripper, *self.others) if hand.told)
