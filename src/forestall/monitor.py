@@ -2,8 +2,8 @@
 
 Whoever owns the robot calls it: the episode loop (`runtime.py`), a replay of stored data, an
 executive of the user's own. It calls perceiver and strategy, which come through the constructor;
-where the run stands is in `run_state.py`, what an answer comes to in `conclusion.py`. An exception
-in a part comes out as the error that it is.
+where the run stands is in `run_state.py`, what an answer comes to in `conclusion.py`. A part that
+raises or does not answer in time is a "hold" that names it (`supervision.py`), never an answer.
 
     monitor.start(task)
     monitor.observe(first_look)
@@ -23,9 +23,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from forestall.conclusion import MonitorConfig, conclude
-from forestall.errors import InputError, UnknownNameError
+from forestall.errors import InputError, PartError, UnknownNameError
+from forestall.in_a_row import Streaks
 from forestall.records.boundary import boundary_record
 from forestall.run_state import RunState
+from forestall.supervised import SupervisedParts
+from forestall.supervision import Supervisor, part_error
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
 from forestall.types.facts import GRIPPER
@@ -63,6 +66,7 @@ class Monitor:
         config: bounds and policies.
         scope: the part of a graph that concerns a subtask; the perceiver's own by default, without
             one the whole graph.
+        supervisor: calls perceiver and strategy; one of its own by default.
     """
 
     def __init__(
@@ -72,12 +76,19 @@ class Monitor:
         perceiver: Perceiver | None = None,
         config: MonitorConfig | None = None,
         scope: Callable[[SceneGraph, Subtask], SceneGraph] | None = None,
+        supervisor: Supervisor | None = None,
     ) -> None:
         self._strategy = strategy
         self._domain = domain
-        self._perceiver = perceiver
         self._config = config or MonitorConfig()
-        self._scope = scope or (_whole if perceiver is None else perceiver.scope)
+        self._parts = SupervisedParts(
+            strategy,
+            perceiver,
+            scope or (_whole if perceiver is None else perceiver.scope),
+            supervisor or Supervisor(self._config.limits),
+        )
+        self.failed: PartError | None = None
+        """What the newest "hold" comes from, where a part failed or was late."""
         self._state: RunState | None = None
         self._awaited: tuple[BoundaryContext, SkillOutcome] | None = None  # a look after it
 
@@ -87,14 +98,16 @@ class Monitor:
         Args:
             task: goal and names; a plan alone is a task without a goal condition.
             plan: the plan to start with, the task's own by default.
+
+        Raises:
+            PartError: the perceiver cannot be reset, or has not come back from an earlier run.
         """
         if isinstance(task, Plan):
             task = Task(task.goal, task.goal, Goal(task.goal), task, SceneNeeds())
         first = task.plan if plan is None else plan
         self._state = RunState(task, first, self._domain, first)
-        self._awaited = None
-        if self._perceiver is not None:
-            self._perceiver.reset()
+        self._awaited = self.failed = None
+        self._parts.reset()
 
     def check(self, scene: Scene, subtask: Subtask | str) -> MonitorDecision:
         """May this one subtask start in this scene? A run that is going on is forgotten.
@@ -116,7 +129,11 @@ class Monitor:
         return self.before(scene)
 
     def observe(self, observation: Scene) -> None:
-        """The first look around: it is remembered, nothing is judged."""
+        """The first look around: it is remembered, nothing is judged.
+
+        Raises:
+            PartError: the perceiver failed, was late, or cannot believe what it was given.
+        """
         with self._run.phase("perceive"):
             self._see(observation)
         self._run.mark()
@@ -172,8 +189,13 @@ class Monitor:
             run.mark()
             assert run.last is not None
             told = replace(outcome, reason="")  # it may name what the robot has not seen
+            if why := run.streaks.too_many(self._config.limits):
+                return self._hold_for_too_many(run.last.subtask, why)
             if self._strategy.looks_after is not LooksAfter.SUBTASK:
-                answer = self._strategy.after_subtask(run.last, told)
+                try:
+                    answer = self._parts.judge(self._strategy.after_subtask, run.last, told)
+                except PartError as error:
+                    return self._hold_for(error, run.last.subtask)
                 silent = answer.decision is Decision.PROCEED and answer.verdict is None
                 over = replace(run.last, when=When.AFTER, may_look=False)
                 return None if silent else self._conclude(over, answer)
@@ -212,7 +234,10 @@ class Monitor:
         if observation is None:
             if self._strategy.looks_after is not LooksAfter.NOTHING:
                 return self._look(last.subtask, "what the plan has led to is judged")
-            answer = self._strategy.after_episode(last)
+            try:
+                answer = self._parts.judge(self._strategy.after_episode, last)
+            except PartError as error:
+                return self._hold_for(error, last.subtask)
             return self._conclude(replace(last, when=When.END, may_look=False), answer)
         decision = self._judge(
             When.END, len(run.plan), last.subtask, observation, self._strategy.after_episode
@@ -326,9 +351,7 @@ class Monitor:
             if hand is not None and hand.centroid_m is not None:
                 run.robot_world_m = hand.centroid_m
             return
-        if self._perceiver is None:
-            raise InputError("this monitor has no perceiver: give it a scene graph")
-        run.graph = self._perceiver.perceive(observation)
+        run.graph = self._parts.perceive(observation)
         run.robot_world_m = observation.robot_position_world_m
         run.time_s = observation.time_s
 
@@ -340,39 +363,106 @@ class Monitor:
         observation: Scene,
         ask: Callable[[BoundaryContext], StrategyAnswer],
     ) -> MonitorDecision:
-        """One look of one moment: fuse, ask the strategy, conclude, record."""
+        """One look of one moment; whatever of ours fails in it, the robot holds."""
+        try:
+            return self._judge_once(when, index, subtask, observation, ask)
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a mistake of ours is no answer
+            named = error if isinstance(error, PartError) else part_error("monitor", error)
+            if named is not error:
+                named.__cause__ = error
+            return self._failed(named, when, index, subtask, observation)
+
+    def _judge_once(
+        self,
+        when: When,
+        index: int,
+        subtask: Subtask | None,
+        observation: Observation | SceneGraph,
+        ask: Callable[[BoundaryContext], StrategyAnswer],
+    ) -> MonitorDecision:
+        """Fuse, ask the strategy, conclude, record."""
         run = self._run
         with run.phase("perceive"):
             self._see(observation)
             picture = observation if isinstance(observation, Observation) else None
             subtask = run.ground() if subtask is None else subtask
             looks = self._config.max_looks
-            context = run.context(when, index, subtask, self._scope, picture, looks)
+            context = run.context(when, index, subtask, self._parts.scope, picture, looks)
         started = time.perf_counter()
-        answer = ask(context)
+        answer = self._parts.judge(ask, context)
         spent = time.perf_counter() - started
         for name, seconds in answer.seconds:
             run.book(name, seconds)
         run.book("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
-        number = run.boundary - (when is When.AFTER)
         decision = self._conclude(context, answer)
-        record = boundary_record(
-            number, context, answer, decision.outcome, run.since, run.seconds, run.time_s
-        )
-        run.mark()
         if when is When.BEFORE:
             run.last, run.ready = context, decision.outcome is not Outcome.REPLAN
+        return self._recorded(decision, context, answer)
+
+    def _recorded(
+        self, decision: MonitorDecision, context: BoundaryContext, answer: StrategyAnswer
+    ) -> MonitorDecision:
+        """The decision with the record of its moment, which is over unless another look follows."""
+        run, after = self._run, context.when is When.AFTER
+        record = boundary_record(
+            run.boundary - after,
+            context,
+            answer,
+            decision.outcome,
+            run.since,
+            run.seconds,
+            run.time_s,
+        )
+        run.mark()
         if decision.outcome is Outcome.LOOK:
             run.looks = context.looks
         else:
             run.looks = 0
-            run.boundary += when is not When.AFTER
+            run.boundary += not after
         return replace(decision, context=context, record=record, seconds=record.seconds)
+
+    def _failed(
+        self,
+        error: PartError,
+        when: When,
+        index: int,
+        subtask: Subtask | None,
+        observation: Observation | SceneGraph,
+    ) -> MonitorDecision:
+        """Hold on what was known before; what the robot sees may be looked at once more."""
+        run = self._run
+        if subtask is None:
+            subtask = run.plan.subtasks[run.position]
+        picture = None if isinstance(observation, SceneGraph) else observation
+        context = run.context(when, index, subtask, _whole, picture, self._config.max_looks)
+        decision = self._hold_for(error, subtask)
+        if error.senses and context.may_look:
+            decision = replace(self._look(subtask, str(error)), why=str(error))
+        run.ready = False
+        return self._recorded(decision, context, StrategyAnswer(Decision.STOP, why=str(error)))
+
+    def _hold_for(self, error: PartError, subtask: Subtask | None) -> MonitorDecision:
+        """A part failed, was late, or cannot believe what the robot sees."""
+        self.failed = error
+        hold = Hold.SENSES if error.senses else Hold.INTERNAL
+        return MonitorDecision(Outcome.HOLD, False, subtask, hold=hold, why=str(error))
+
+    def _hold_for_too_many(self, subtask: Subtask, why: str) -> MonitorDecision:
+        """Something went wrong too often; whoever goes on all the same begins to count anew."""
+        self._run.streaks = Streaks()
+        return MonitorDecision(Outcome.HOLD, False, subtask, hold=Hold.TOO_MANY, why=why)
 
     def _conclude(self, context: BoundaryContext, answer: StrategyAnswer) -> MonitorDecision:
         """What a strategy's answer comes to; a new plan is adopted here."""
         run = self._run
         decision = conclude(context, answer, self._config, self._strategy.name)
+        if why := run.streaks.after(decision, self._config.limits):
+            held = self._hold_for_too_many(context.subtask, why)
+            return replace(
+                decision, outcome=held.outcome, may_start=False, plan=None, hold=held.hold, why=why
+            )
         if decision.plan is not None:
             run.adopt(decision.plan)
             self._awaited = None

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from forestall.domain.names import executable, ground_subtask
 from forestall.errors import InputError
+from forestall.in_a_row import Streaks
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
 from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import SceneGraph
@@ -75,6 +76,7 @@ class RunState:
         robot_world_m: where the robot stands.
         worked_at: where the hand let go last.
         time_s: of the robot's clock.
+        streaks: what has gone wrong in a row.
         seconds: measured time by phase; `since` is the same when the boundary began.
     """
 
@@ -96,6 +98,7 @@ class RunState:
     robot_world_m: Vec3 = (0.0, 0.0, 0.0)
     worked_at: Vec3 | None = None
     time_s: float = 0.0
+    streaks: Streaks = field(default_factory=Streaks)
     seconds: dict[str, float] = field(default_factory=dict)
     since: dict[str, float] = field(default_factory=dict)
 
@@ -203,6 +206,7 @@ class RunState:
         self.executed.append(ExecutedRecord(command, outcome, self.boundary - 1))
         self.position += 1
         self.ready = False
+        self.streaks.executed(outcome.status is SkillStatus.SUCCEEDED)
 
     def context(
         self,
