@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock, Intervention
 from forestall.types.episode import SkillOutcome
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
@@ -37,9 +38,9 @@ class Proactive:
         validator: PlanValidator,
         max_attempts: int = 2,
     ) -> None:
-        self._retriever = retriever
-        self._detector = detector
-        self._reasoner = reasoner
+        self._retriever = AskedRetriever(retriever)
+        self._detector = AskedDetector(detector)
+        self._reasoner = AskedReasoner(reasoner)
         self._intervention = Intervention(replanner, validator, max_attempts)
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
