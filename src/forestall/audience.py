@@ -68,7 +68,7 @@ class _Seat:
 
     def __init__(self, listener: Listener) -> None:
         self._listener = listener
-        self._name = f"listener {type(listener).__name__}"
+        self._name = f"listener {listener.__class__.__name__}"
         self._said: queue.SimpleQueue[_Said | None] = queue.SimpleQueue()
         self._open = 0
         self._now = ""

@@ -10,7 +10,6 @@ ForestallError
 ├── ModelFileError         a model is missing or damaged, or cannot be run here
 ├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
 ├── PerceptionError        an observation that cannot be used (NaN depth, wrong shapes)
-│   └── ObservationError   one that cannot be what the robot sees (frozen, black, back in time)
 └── PartError              a part of a run that raised, gave nonsense or did not answer in time
 """
 
@@ -92,10 +91,6 @@ class SceneError(ForestallError):
 
 class PerceptionError(ForestallError):
     """An observation that cannot be used."""
-
-
-class ObservationError(PerceptionError):
-    """An observation that cannot be what the robot sees: nothing may be decided on it."""
 
 
 class PartError(ForestallError):

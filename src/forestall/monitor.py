@@ -23,10 +23,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from forestall.conclusion import MonitorConfig, conclude
-from forestall.errors import InputError, PartError, UnknownNameError
+from forestall.errors import InputError, ObservationError, PartError, UnknownNameError
 from forestall.in_a_row import Streaks
 from forestall.records.boundary import boundary_record
 from forestall.run_state import RunState
+from forestall.senses import Senses
 from forestall.supervised import SupervisedParts
 from forestall.supervision import Supervisor, part_error
 from forestall.types.decision import Hold, MonitorDecision, Outcome
@@ -85,6 +86,7 @@ class Monitor:
             strategy,
             perceiver,
             scope or (_whole if perceiver is None else perceiver.scope),
+            domain,
             supervisor or Supervisor(self._config.limits),
         )
         self.failed: PartError | None = None
@@ -105,7 +107,9 @@ class Monitor:
         if isinstance(task, Plan):
             task = Task(task.goal, task.goal, Goal(task.goal), task, SceneNeeds())
         first = task.plan if plan is None else plan
-        self._state = RunState(task, first, self._domain, first)
+        self._state = RunState(
+            task, first, self._domain, first, Senses(self._config.limits.max_unchanged)
+        )
         self._awaited = self.failed = None
         self._parts.reset()
 
@@ -343,8 +347,10 @@ class Monitor:
 
     def _see(self, observation: Scene) -> None:
         run = self._run
-        if isinstance(observation, Mapping):
-            observation = scene_graph(observation)
+        try:
+            run.senses.check(observation)
+        except ObservationError as error:
+            raise part_error("senses", error) from error
         if isinstance(observation, SceneGraph):
             run.graph = replace(observation, subtask=None)
             hand = observation.get(GRIPPER)
@@ -364,10 +370,10 @@ class Monitor:
         ask: Callable[[BoundaryContext], StrategyAnswer],
     ) -> MonitorDecision:
         """One look of one moment; whatever of ours fails in it, the robot holds."""
+        if not isinstance(observation, SceneGraph) and not self._parts.perceives:
+            raise InputError("this monitor has no perceiver: give it a scene graph")
         try:
             return self._judge_once(when, index, subtask, observation, ask)
-        except InputError:
-            raise
         except Exception as error:  # noqa: BLE001 - a mistake of ours is no answer
             named = error if isinstance(error, PartError) else part_error("monitor", error)
             if named is not error:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from forestall.domain.names import executable, ground_subtask
 from forestall.errors import InputError
 from forestall.in_a_row import Streaks
+from forestall.senses import Senses
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
 from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import SceneGraph
@@ -63,6 +64,7 @@ class RunState:
         first_plan: the plan that the run started with.
         domain: resolves names.
         plan: the plan at hand.
+        senses: whether what is seen can be so.
         position: in it, of the subtask that comes next.
         replans: how many plans were adopted.
         looks: taken at the boundary that is open, 0 where none is.
@@ -84,6 +86,7 @@ class RunState:
     first_plan: Plan
     domain: Domain
     plan: Plan
+    senses: Senses
     position: int = 0
     replans: int = 0
     looks: int = 0
@@ -207,6 +210,8 @@ class RunState:
         self.position += 1
         self.ready = False
         self.streaks.executed(outcome.status is SkillStatus.SUCCEEDED)
+        if outcome.status is SkillStatus.SUCCEEDED:
+            self.senses.done(bool(self.domain.skill(command.skill).effects))
 
     def context(
         self,

@@ -282,8 +282,10 @@ class Runtime:
         with monitor.phase("act"):
             outcome = self._world.execute(command)
         answer = monitor.after(outcome)
-        episode.time_s = self._world.time_s()
-        episode.audience.tell("on_executed", monitor.executed[-1], episode.time_s)
+        try:
+            episode.time_s = self._world.time_s()
+        finally:
+            episode.audience.tell("on_executed", monitor.executed[-1], episode.time_s)
         if answer is None or answer.outcome is not Outcome.LOOK:
             return answer
         return self._judged(episode, lambda seen: _some(monitor.after(outcome, seen)))
@@ -322,8 +324,8 @@ class Runtime:
         if not self._config.keep_observations:
             record = replace(record, observation=None)
         episode.boundaries.append(record)
-        episode.time_s = self._world.time_s()
         episode.audience.tell("on_boundary", record, context)
+        episode.time_s = self._world.time_s()
 
 
 def _some(decision: MonitorDecision | None) -> MonitorDecision:

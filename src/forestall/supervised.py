@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from forestall.errors import InputError, ObservationError, PartError
+from forestall.errors import ForestallError, ObservationError, PartError
 from forestall.supervision import Supervisor, checked_answer
 from forestall.types.episode import SkillOutcome
 from forestall.types.graph import SceneGraph
@@ -21,6 +21,7 @@ from forestall.types.runtime import StrategyAnswer
 from forestall.types.verdict import Decision, Diagnosis, Replan, Verdict
 
 if TYPE_CHECKING:
+    from forestall.domain.model import Domain
     from forestall.seams import Environment, Perceiver, Strategy
 
 Scope = Callable[[SceneGraph, Subtask], SceneGraph]
@@ -60,7 +61,9 @@ class SupervisedWorld:
         return self._calls.call("execute", lambda: do(subtask), "execute", gives=SkillOutcome)
 
     def time_s(self) -> float:
-        """The world's clock, which does not go back."""
+        """The world's clock, which does not go back; what it said last where nobody can ask it."""
+        if self._calls.late is not None:
+            return self._now_s
         now_s = self._calls.call("time", lambda: _finite(self._environment.time_s), "time")
         if now_s < self._now_s:
             raise _unbelievable("time", f"went back from {self._now_s:.1f} s to {now_s:.1f} s")
@@ -94,14 +97,26 @@ class SupervisedParts:
         strategy: judges.
         perceiver: None where scene graphs are given.
         scope: the part of a graph that concerns a subtask.
+        domain: what plans are checked against.
         calls: makes the calls.
     """
 
     def __init__(
-        self, strategy: Strategy, perceiver: Perceiver | None, scope: Scope, calls: Supervisor
+        self,
+        strategy: Strategy,
+        perceiver: Perceiver | None,
+        scope: Scope,
+        domain: Domain,
+        calls: Supervisor,
     ) -> None:
         self._name = f"strategy {strategy.name}"
+        self._domain = domain
         self._perceiver, self._scope, self._calls = perceiver, scope, calls
+
+    @property
+    def perceives(self) -> bool:
+        """Whether there is a perceiver."""
+        return self._perceiver is not None
 
     def reset(self) -> None:
         """The perceiver forgets; also what was late is forgotten, if it has come back.
@@ -117,11 +132,9 @@ class SupervisedParts:
         """The whole graph as believed now.
 
         Raises:
-            InputError: there is no perceiver.
             PartError: it failed, was late, or does not believe what it was given.
         """
-        if self._perceiver is None:
-            raise InputError("this monitor has no perceiver: give it a scene graph")
+        assert self._perceiver is not None, "the monitor has seen to that"
         perceive = self._perceiver.perceive
         return self._calls.call(
             "perceiver", lambda: perceive(observation), "perceive", gives=SceneGraph
@@ -156,6 +169,12 @@ class SupervisedParts:
         score = None if answer.verdict is None else answer.verdict.score
         if score is not None and not math.isfinite(score):
             raise PartError(name, f"gave the score {score}", internal=True)
+        plan = None if answer.replan is None else answer.replan.plan
+        if plan is not None:
+            try:
+                self._domain.check_plan(plan)
+            except ForestallError as error:
+                raise PartError(name, f"gave a plan that cannot be: {error}") from error
         return answer
 
 

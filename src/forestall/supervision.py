@@ -59,6 +59,8 @@ class Limits:
             robot; 0: no limit.
         max_repairs_in_a_row: the same for new plans without a subtask that succeeds between them.
         max_failures_in_a_row: the same for subtasks that were refused or failed.
+        max_unchanged: subtasks that may be reported as done, one of them with an effect, while a
+            given scene graph stays the same; 0: any number.
 
     Raises:
         InputError: a time that is not above 0, or a number below 0.
@@ -84,6 +86,7 @@ class Limits:
     max_alarms_in_a_row: int = 8
     max_repairs_in_a_row: int = 8
     max_failures_in_a_row: int = 8
+    max_unchanged: int = 3
 
     def __post_init__(self) -> None:
         for each in fields(self):

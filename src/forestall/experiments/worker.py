@@ -36,7 +36,10 @@ from forestall.types.episode import (
 from forestall.types.runtime import When
 from forestall.types.verdict import Decision, ReplanOutcome
 
-UNLIMITED = {f"max_{what}_in_a_row": 0 for what in ("alarms", "repairs", "failures")}
+UNLIMITED = {
+    **{f"max_{what}_in_a_row": 0 for what in ("alarms", "repairs", "failures")},
+    "max_unchanged": 0,
+}
 """An experiment goes on as the paper does, however often something goes wrong, and counts it."""
 
 _BROKEN = (TroubleKind.INTERNAL, TroubleKind.FAILED, TroubleKind.WORLD)
