@@ -48,7 +48,7 @@ def test_all_have_heard_when_the_loop_goes_on() -> None:
 
 def test_one_that_is_late_keeps_nobody_waiting_and_hears_everything_in_the_end() -> None:
     slow, quick = Slow(), Quick()
-    audience = Audience([slow, quick], 0.1)  # type: ignore[list-item]
+    audience = Audience([slow, quick], 0.1)
     started = time.monotonic()
     for k in range(50):
         audience.tell("on_boundary", k)

@@ -139,7 +139,7 @@ def test_work_that_asks_its_deadline_is_told_to_stop() -> None:
 
 def test_an_answer_of_another_type_is_an_error_of_the_part() -> None:
     with pytest.raises(PartError, match="internal error in perceiver: gave int instead of str"):
-        Supervisor().call("perceiver", lambda: 1, "perceive", gives=str)
+        Supervisor().call("perceiver", lambda: 1, "perceive", gives=str)  # type: ignore[arg-type, return-value]
     with pytest.raises(PartError, match="detector: gave None"):
         ask("detector", "detect", str, lambda: None)
 

@@ -16,23 +16,20 @@ A scene is an observation (RGB-D), a scene graph, or one in its short form (`typ
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from forestall.conclusion import MonitorConfig, conclude
-from forestall.errors import InputError, ObservationError, PartError, UnknownNameError
-from forestall.in_a_row import Streaks
-from forestall.records.boundary import boundary_record
+from forestall.conclusion import MonitorConfig
+from forestall.errors import InputError, PartError, UnknownNameError
+from forestall.moments import Moments
 from forestall.run_state import RunState
 from forestall.senses import Senses
 from forestall.supervised import SupervisedParts
-from forestall.supervision import Supervisor, part_error
+from forestall.supervision import Supervisor
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
-from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
@@ -89,8 +86,7 @@ class Monitor:
             domain,
             supervisor or Supervisor(self._config.limits),
         )
-        self.failed: PartError | None = None
-        """What the newest "hold" comes from, where a part failed or was late."""
+        self._moments = Moments(self._parts, self._config, strategy.name)
         self._state: RunState | None = None
         self._awaited: tuple[BoundaryContext, SkillOutcome] | None = None  # a look after it
 
@@ -110,7 +106,8 @@ class Monitor:
         self._state = RunState(
             task, first, self._domain, first, Senses(self._config.limits.max_unchanged)
         )
-        self._awaited = self.failed = None
+        self._awaited = None
+        self._moments.failed = None
         self._parts.reset()
 
     def check(self, scene: Scene, subtask: Subtask | str) -> MonitorDecision:
@@ -128,7 +125,10 @@ class Monitor:
         wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
         if wanted.skill in self._domain.skills:
             self._domain.check(wanted)
-        self.start(Plan((wanted,)))
+        try:
+            self.start(Plan((wanted,)))
+        except PartError as error:
+            return self._moments.hold_for(error, wanted)
         self._run.looks = self._config.max_looks - 1
         return self.before(scene)
 
@@ -139,7 +139,7 @@ class Monitor:
             PartError: the perceiver failed, was late, or cannot believe what it was given.
         """
         with self._run.phase("perceive"):
-            self._see(observation)
+            self._moments.see(self._run, self._read(observation))
         self._run.mark()
 
     def before(self, observation: Scene, subtask: Subtask | str | None = None) -> MonitorDecision:
@@ -193,20 +193,20 @@ class Monitor:
             run.mark()
             assert run.last is not None
             told = replace(outcome, reason="")  # it may name what the robot has not seen
-            if why := run.streaks.too_many(self._config.limits):
-                return self._hold_for_too_many(run.last.subtask, why)
+            if (held := self._moments.too_many(run, run.last.subtask)) is not None:
+                return held
             if self._strategy.looks_after is not LooksAfter.SUBTASK:
                 try:
                     answer = self._parts.judge(self._strategy.after_subtask, run.last, told)
                 except PartError as error:
-                    return self._hold_for(error, run.last.subtask)
+                    return self._moments.hold_for(error, run.last.subtask)
                 silent = answer.decision is Decision.PROCEED and answer.verdict is None
                 over = replace(run.last, when=When.AFTER, may_look=False)
-                return None if silent else self._conclude(over, answer)
+                return None if silent else self._moments.conclude(run, over, answer)
             self._awaited = (run.last, told)
         context, told = self._awaited
         if observation is None:
-            return self._look(context.subtask, "what a subtask has led to is judged")
+            return self._moments.look(run, context.subtask, "what a subtask has led to is judged")
         decision = self._judge(
             When.AFTER,
             context.index,
@@ -237,12 +237,12 @@ class Monitor:
             return MonitorDecision(Outcome.NOT_JUDGED, may, why="nothing was executed")
         if observation is None:
             if self._strategy.looks_after is not LooksAfter.NOTHING:
-                return self._look(last.subtask, "what the plan has led to is judged")
+                return self._moments.look(run, last.subtask, "what the plan has led to is judged")
             try:
                 answer = self._parts.judge(self._strategy.after_episode, last)
             except PartError as error:
-                return self._hold_for(error, last.subtask)
-            return self._conclude(replace(last, when=When.END, may_look=False), answer)
+                return self._moments.hold_for(error, last.subtask)
+            return self._moments.conclude(run, replace(last, when=When.END, may_look=False), answer)
         decision = self._judge(
             When.END, len(run.plan), last.subtask, observation, self._strategy.after_episode
         )
@@ -279,6 +279,11 @@ class Monitor:
         """The newest subtask that was judged before it started, None where none was yet."""
         context = self._run.last
         return None if context is None else context.subtask
+
+    @property
+    def failed(self) -> PartError | None:
+        """What the newest "hold" comes from, where a part failed or was late."""
+        return self._moments.failed
 
     @property
     def bound(self) -> dict[str, str]:
@@ -345,142 +350,23 @@ class Monitor:
             return MonitorDecision(Outcome.NOT_JUDGED, False, planned, why=str(error))
         return None
 
-    def _see(self, observation: Scene) -> None:
-        run = self._run
-        try:
-            run.senses.check(observation)
-        except ObservationError as error:
-            raise part_error("senses", error) from error
-        if isinstance(observation, SceneGraph):
-            run.graph = replace(observation, subtask=None)
-            hand = observation.get(GRIPPER)
-            if hand is not None and hand.centroid_m is not None:
-                run.robot_world_m = hand.centroid_m
-            return
-        run.graph = self._parts.perceive(observation)
-        run.robot_world_m = observation.robot_position_world_m
-        run.time_s = observation.time_s
-
     def _judge(
         self,
         when: When,
         index: int,
         subtask: Subtask | None,
-        observation: Scene,
+        scene: Scene,
         ask: Callable[[BoundaryContext], StrategyAnswer],
     ) -> MonitorDecision:
-        """One look of one moment; whatever of ours fails in it, the robot holds."""
-        if not isinstance(observation, SceneGraph) and not self._parts.perceives:
+        return self._moments.judge(self._run, when, index, subtask, self._read(scene), ask)
+
+    def _read(self, scene: Scene) -> Observation | SceneGraph:
+        """What can be judged; raises InputError where it is neither a picture nor a scene."""
+        if isinstance(scene, Mapping):
+            return scene_graph(scene)
+        if not isinstance(scene, SceneGraph) and not self._parts.perceives:
             raise InputError("this monitor has no perceiver: give it a scene graph")
-        try:
-            return self._judge_once(when, index, subtask, observation, ask)
-        except Exception as error:  # noqa: BLE001 - a mistake of ours is no answer
-            named = error if isinstance(error, PartError) else part_error("monitor", error)
-            if named is not error:
-                named.__cause__ = error
-            return self._failed(named, when, index, subtask, observation)
-
-    def _judge_once(
-        self,
-        when: When,
-        index: int,
-        subtask: Subtask | None,
-        observation: Observation | SceneGraph,
-        ask: Callable[[BoundaryContext], StrategyAnswer],
-    ) -> MonitorDecision:
-        """Fuse, ask the strategy, conclude, record."""
-        run = self._run
-        with run.phase("perceive"):
-            self._see(observation)
-            picture = observation if isinstance(observation, Observation) else None
-            subtask = run.ground() if subtask is None else subtask
-            looks = self._config.max_looks
-            context = run.context(when, index, subtask, self._parts.scope, picture, looks)
-        started = time.perf_counter()
-        answer = self._parts.judge(ask, context)
-        spent = time.perf_counter() - started
-        for name, seconds in answer.seconds:
-            run.book(name, seconds)
-        run.book("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
-        decision = self._conclude(context, answer)
-        if when is When.BEFORE:
-            run.last, run.ready = context, decision.outcome is not Outcome.REPLAN
-        return self._recorded(decision, context, answer)
-
-    def _recorded(
-        self, decision: MonitorDecision, context: BoundaryContext, answer: StrategyAnswer
-    ) -> MonitorDecision:
-        """The decision with the record of its moment, which is over unless another look follows."""
-        run, after = self._run, context.when is When.AFTER
-        record = boundary_record(
-            run.boundary - after,
-            context,
-            answer,
-            decision.outcome,
-            run.since,
-            run.seconds,
-            run.time_s,
-        )
-        run.mark()
-        if decision.outcome is Outcome.LOOK:
-            run.looks = context.looks
-        else:
-            run.looks = 0
-            run.boundary += not after
-        return replace(decision, context=context, record=record, seconds=record.seconds)
-
-    def _failed(
-        self,
-        error: PartError,
-        when: When,
-        index: int,
-        subtask: Subtask | None,
-        observation: Observation | SceneGraph,
-    ) -> MonitorDecision:
-        """Hold on what was known before; what the robot sees may be looked at once more."""
-        run = self._run
-        if subtask is None:
-            subtask = run.plan.subtasks[run.position]
-        picture = None if isinstance(observation, SceneGraph) else observation
-        context = run.context(when, index, subtask, _whole, picture, self._config.max_looks)
-        decision = self._hold_for(error, subtask)
-        if error.senses and context.may_look:
-            decision = replace(self._look(subtask, str(error)), why=str(error))
-        run.ready = False
-        return self._recorded(decision, context, StrategyAnswer(Decision.STOP, why=str(error)))
-
-    def _hold_for(self, error: PartError, subtask: Subtask | None) -> MonitorDecision:
-        """A part failed, was late, or cannot believe what the robot sees."""
-        self.failed = error
-        hold = Hold.SENSES if error.senses else Hold.INTERNAL
-        return MonitorDecision(Outcome.HOLD, False, subtask, hold=hold, why=str(error))
-
-    def _hold_for_too_many(self, subtask: Subtask, why: str) -> MonitorDecision:
-        """Something went wrong too often; whoever goes on all the same begins to count anew."""
-        self._run.streaks = Streaks()
-        return MonitorDecision(Outcome.HOLD, False, subtask, hold=Hold.TOO_MANY, why=why)
-
-    def _conclude(self, context: BoundaryContext, answer: StrategyAnswer) -> MonitorDecision:
-        """What a strategy's answer comes to; a new plan is adopted here."""
-        run = self._run
-        decision = conclude(context, answer, self._config, self._strategy.name)
-        if why := run.streaks.after(decision, self._config.limits):
-            held = self._hold_for_too_many(context.subtask, why)
-            return replace(
-                decision, outcome=held.outcome, may_start=False, plan=None, hold=held.hold, why=why
-            )
-        if decision.plan is not None:
-            run.adopt(decision.plan)
-            self._awaited = None
-        elif decision.outcome is Outcome.LOOK:
-            return replace(decision, look_at=run.views(context.subtask))
-        elif context.when is When.BEFORE:
-            return replace(decision, command=run.command(context.subtask, context.index))
-        return decision
-
-    def _look(self, subtask: Subtask, why: str) -> MonitorDecision:
-        views = self._run.views(subtask)
-        return MonitorDecision(Outcome.LOOK, False, subtask, look_at=views, why=why)
+        return scene
 
 
 def _ended(outcome: SkillOutcome | str, reason: str) -> SkillOutcome:

@@ -262,6 +262,9 @@ class Runtime:
                 decision = self._before(episode)
                 if decision.may_start:
                     decision = self._execute(episode, decision) or decision
+                elif decision.outcome is Outcome.NOT_JUDGED:
+                    episode.trouble = Trouble(TroubleKind.FAILED, "monitor", decision.why)
+                    return EpisodeEnd.HELD
             if decision.hold is not None:
                 if decision.hold in _TROUBLES:
                     episode.trouble = _of_decision(decision, monitor.failed)
@@ -320,7 +323,8 @@ class Runtime:
 
     def _note(self, episode: _Episode, decision: MonitorDecision) -> None:
         record, context = decision.record, decision.context
-        assert record is not None and context is not None, "what was looked at is recorded"
+        if record is None or context is None:
+            return  # of a skill that nobody knows nothing is judged
         if not self._config.keep_observations:
             record = replace(record, observation=None)
         episode.boundaries.append(record)

@@ -39,8 +39,10 @@ class Senses:
         Raises:
             ObservationError: it cannot; says why.
         """
-        graph = observation
-        if isinstance(observation, Observation):
+        graph: SceneGraph | None
+        if isinstance(observation, SceneGraph):
+            graph = observation
+        else:
             self._check_clock(observation.time_s)
             if not observation.frames and (
                 observation.graph is None or not observation.graph.nodes

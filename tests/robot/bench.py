@@ -145,9 +145,8 @@ def play(robot: Robot, perceiver: Any = None, world: Callable[[Any], Any] | None
             ("validator", VALIDATOR),
         )
     ]
-    strategy: Any = (
-        Online(*of_strategy, scope=perceive.scope) if robot.online else Proactive(*of_strategy)
-    )
+    online = Online(*of_strategy, perceive.scope)
+    strategy: Any = online if robot.online else Proactive(*of_strategy)
     first = Telling()
     runtime = Runtime(
         watched,

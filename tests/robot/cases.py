@@ -18,7 +18,7 @@ from robot.bench import DISTURBED, Played, Robot, frozen, play
 SHORT_S = 0.2
 """The limit of a call that hangs."""
 
-HANGS: Instead = hangs  # type: ignore[assignment]
+HANGS: Instead = hangs
 """Stands for a call that does not come back before its run is over."""
 
 

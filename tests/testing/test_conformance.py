@@ -95,18 +95,18 @@ def test_a_refusal_without_a_reason_is_found() -> None:
     assert any("without a reason" in c for c in check_environment(Silent, 0, STEPS, HOUSEHOLD))
 
 
-def test_an_arm_that_lets_go_or_goes_on_after_hold_is_found():
+def test_an_arm_that_lets_go_or_goes_on_after_hold_is_found() -> None:
     class LettingGo(_Broken):
-        def hold(self):
+        def hold(self) -> None:
             self._inner.drop_held()
             self._inner.hold()
 
     class Deaf(_Broken):
-        def hold(self):
+        def hold(self) -> None:
             pass
 
     class Failing(_Broken):
-        def hold(self):
+        def hold(self) -> None:
             raise RuntimeError("no brake")
 
     found = check_environment(LettingGo, 3, STEPS, HOUSEHOLD)
@@ -117,7 +117,7 @@ def test_an_arm_that_lets_go_or_goes_on_after_hold_is_found():
     assert any("hold raises" in c for c in check_environment(Failing, 3, STEPS, HOUSEHOLD))
 
 
-def test_a_symbolic_world_conforms():
+def test_a_symbolic_world_conforms() -> None:
     bench = shipped("bench")
     task = load_task("glue-peg").task
     steps = list(task.plan.subtasks[:3])

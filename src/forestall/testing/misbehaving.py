@@ -52,7 +52,7 @@ class _Misbehaving:
         self._good, self._fault = good, fault
 
     @property
-    def __class__(self) -> Any:
+    def __class__(self) -> Any:  # type: ignore[misc]
         return type(self._good)
 
     def __getattr__(self, name: str) -> Any:
