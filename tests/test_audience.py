@@ -38,7 +38,7 @@ class Quick(Slow):
 
 def test_all_have_heard_when_the_loop_goes_on() -> None:
     one, two = Quick(), Quick()
-    audience = Audience([one, two], 5.0)  # type: ignore[list-item]
+    audience = Audience([one, two], 5.0)
     for k in range(20):
         audience.tell("on_boundary", k)
         assert one.heard[-1] == two.heard[-1] == ("on_boundary", k)
@@ -69,7 +69,7 @@ def test_failures_are_counted_by_what_was_told() -> None:
         def on_boundary(self, about: int) -> None:
             raise OSError(f"disk full at {about}")
 
-    audience = Audience([Broken()], 5.0)  # type: ignore[list-item]
+    audience = Audience([Broken()], 5.0)
     for k in range(3):
         audience.tell("on_boundary", k)
     audience.leave()

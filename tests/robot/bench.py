@@ -135,7 +135,7 @@ def play(robot: Robot, perceiver: Any = None, world: Callable[[Any], Any] | None
     seen = true if world is None else world(true)
     watched = Watched(robot.with_fault("world", seen), robot.faults)
     perceive = robot.with_fault("perceiver", perceiver or parts.part(PERCEIVER))
-    of_strategy = [
+    retriever, detector, reasoner, replanner, validator = (
         robot.with_fault(name, parts.part(kind))  # type: ignore[misc]
         for name, kind in (
             ("retriever", RETRIEVER),
@@ -144,9 +144,11 @@ def play(robot: Robot, perceiver: Any = None, world: Callable[[Any], Any] | None
             ("replanner", REPLANNER),
             ("validator", VALIDATOR),
         )
-    ]
-    online = Online(*of_strategy, perceive.scope)
-    strategy: Any = online if robot.online else Proactive(*of_strategy)
+    )
+    strategy: Any = Proactive(retriever, detector, reasoner, replanner, validator)
+    if robot.online:
+        scope = perceive.scope
+        strategy = Online(retriever, detector, reasoner, replanner, validator, scope)
     first = Telling()
     runtime = Runtime(
         watched,

@@ -51,8 +51,8 @@ class _Misbehaving:
     def __init__(self, good: Any, fault: Fault) -> None:
         self._good, self._fault = good, fault
 
-    @property
-    def __class__(self) -> Any:  # type: ignore[misc]
+    @property  # type: ignore[misc]
+    def __class__(self) -> Any:
         return type(self._good)
 
     def __getattr__(self, name: str) -> Any:
