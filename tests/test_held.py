@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from forestall.assembly.configuration import Given, run_config
+from forestall.assembly.make import prepare, run_episode
 from forestall.conclusion import MonitorConfig
 from forestall.domain.load import shipped
 from forestall.errors import InputError, ObservationError, PartError
@@ -209,6 +211,19 @@ def test_who_interrupts_a_run_finds_the_robot_held(tmp_path: Path) -> None:
     left = read_record(tmp_path)
     assert left.end is EpisodeEnd.UNFINISHED
     assert len(left.boundaries) == 2  # what was written as it happened
+
+
+def test_limits_are_options_of_a_run_and_stand_in_its_record() -> None:
+    symbolic = {"world": "symbolic", "perceiver": "given-graph"}
+    given = Given.said(["limit.observe_s=7", "limit.max_failures_in_a_row=0"])
+    config = run_config("glue-peg", given=given, strategy="none", **symbolic)
+    limits = dict(run_episode(prepare(config), None).provenance)["loop"]["limits"]
+    assert (limits["observe_s"], limits["max_failures_in_a_row"]) == (7.0, 0)
+    assert limits["scan_s"] == Limits().scan_s
+    with pytest.raises(InputError, match="did you mean observe_s"):
+        run_config("glue-peg", given=Given.said(["limit.observes_s=7"]))
+    with pytest.raises(InputError, match="observe_s is -1"):
+        run_config("glue-peg", given=Given.said(["limit.observe_s=-1"]))
 
 
 def test_a_run_may_follow_a_held_one() -> None:
