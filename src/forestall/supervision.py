@@ -102,6 +102,11 @@ class Limits:
         return seconds
 
 
+def patient(limits: Limits | None = None) -> Limits:
+    """The part `limit` of a run."""
+    return limits or Limits()
+
+
 @dataclass(slots=True)
 class _Doing:
     """What is going on: which part, with which limit, until when."""
