@@ -66,7 +66,7 @@ def test_one_that_is_late_keeps_nobody_waiting_and_hears_everything_in_the_end()
 
 def test_failures_are_counted_by_what_was_told() -> None:
     class Broken(Quick):
-        def on_boundary(self, about: Any) -> None:
+        def on_boundary(self, about: Any, context: Any = None) -> None:
             raise OSError(f"disk full at {about}")
 
     audience = Audience([Broken()], 5.0)

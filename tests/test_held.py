@@ -214,9 +214,10 @@ def test_who_interrupts_a_run_finds_the_robot_held(tmp_path: Path) -> None:
 
 
 def test_limits_are_options_of_a_run_and_stand_in_its_record() -> None:
-    symbolic = {"world": "symbolic", "perceiver": "given-graph"}
     given = Given.said(["limit.observe_s=7", "limit.max_failures_in_a_row=0"])
-    config = run_config("glue-peg", given=given, strategy="none", **symbolic)
+    config = run_config(
+        "glue-peg", given=given, strategy="none", world="symbolic", perceiver="given-graph"
+    )
     limits = dict(run_episode(prepare(config), None).provenance)["loop"]["limits"]
     assert (limits["observe_s"], limits["max_failures_in_a_row"]) == (7.0, 0)
     assert limits["scan_s"] == Limits().scan_s
