@@ -76,7 +76,8 @@ class SceneMemory:
         moved = put | self._carry(places, seen | put)
         if former is not None and former != self._held and former not in seen | put:
             self._drop_from_memory(former, seen)
-        kept = seen | moved | {h for h in (self._held,) if h is not None}
+        kept = seen | moved | {h.holding for h in self._hands if h.holding is not None}
+        kept |= set(unlocated(views))
         was = {t.id for t in before}
         gone = {n for n in was - kept if not self._is_fixture(self.tracks[n].category)}
         merge_renamed(self.tracks, gone, seen - was, self._config)
