@@ -14,6 +14,18 @@ from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask
 from forestall.types.verdict import Calibration, Decision, Replan, ReplanOutcome, Verdict
 from robot.bench import DISTURBED, Played, Robot, frozen, play
+from robot.pictures import (
+    Looking,
+    Pictured,
+    black,
+    flat,
+    grey,
+    in_millimetres,
+    leapt,
+    pictures,
+    stuck,
+    without_depth,
+)
 
 SHORT_S = 0.2
 """The limit of a call that hangs."""
@@ -41,6 +53,7 @@ class Case:
         blamed: the part that it has to name.
         note: what its notes have to say.
         also: another fault: part, call, what is done instead, and after how many calls.
+        camera: whether there are pictures.
         dead: whether the senses are dead, so that no more than three commands may follow.
     """
 
@@ -58,6 +71,7 @@ class Case:
     blamed: str = ""
     note: str = ""
     also: tuple[str, str, Instead, int] | None = None
+    camera: bool = False
     dead: bool = False
 
     def play(self) -> Played:
@@ -71,7 +85,7 @@ class Case:
         if self.also is not None:
             part, call, other, after = self.also
             robot.faults[part] = Fault(call, other, after)
-        return play(robot)
+        return play(robot, Looking(), Pictured) if self.camera else play(robot)
 
 
 class UnspeakableError(Exception):
@@ -112,6 +126,20 @@ def _hanging(call: str, **more: Any) -> Case:
     limit = "time" if call == "time_s" else call
     name = f"world hangs in {call}"
     return Case(name, "world", call, HANGS, after, limit, kind=LATE, blamed=limit, **more)
+
+
+def _camera(name: str, instead: Instead, after: int = 2) -> Case:
+    return Case(
+        f"camera {name}",
+        "world",
+        "scan|observe",
+        instead,
+        after,
+        kind=SENSES,
+        blamed="perceiver",
+        camera=True,
+        dead=True,
+    )
 
 
 def _time(change: Callable[[float], Any]) -> Instead:
@@ -317,8 +345,15 @@ CASES: tuple[Case, ...] = (
         dead=True,
     ),
     # --- senses ---
+    _camera("goes black", pictures(black)),
+    _camera("has no signal", pictures(grey)),
+    _camera("measures the same distance everywhere", pictures(flat)),
+    _camera("measures no distance", pictures(without_depth)),
+    _camera("changes its unit", pictures(in_millimetres)),
+    _camera("leaps", pictures(leapt)),
+    _camera("shows the same picture for ever", stuck()),
     Case(
-        "camera froze",
+        "observations are old",
         "world",
         "observe",
         frozen(fresh=False),
@@ -329,7 +364,7 @@ CASES: tuple[Case, ...] = (
         limits={"max_age_s": 6},
     ),
     Case(
-        "camera froze and stamps what it shows anew",
+        "observations are old and stamped anew",
         "world",
         "observe",
         frozen(fresh=True),

@@ -21,7 +21,7 @@ class Fault:
     """One thing that goes wrong.
 
     Args:
-        call: the method or property concerned.
+        call: the method or property concerned, or several: "scan|observe".
         instead: what is done then.
         after: how many calls go well before.
     """
@@ -56,7 +56,7 @@ class _Misbehaving:
         return type(self._good)
 
     def __getattr__(self, name: str) -> Any:
-        if name != self._fault.call:
+        if name not in self._fault.call.split("|"):
             return getattr(self._good, name)
         if isinstance(getattr(type(self._good), name, None), property):
             return self._fault.run(lambda: getattr(self._good, name))
