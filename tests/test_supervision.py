@@ -8,8 +8,11 @@ from collections.abc import Iterator
 
 import pytest
 
+from forestall.deadline import Deadline
 from forestall.errors import InputError, ObservationError, PartError, PerceptionError
+from forestall.strategies.asked import AskedReplanner
 from forestall.supervision import Limits, Supervisor, ask, deadline, doing
+from forestall.types.verdict import Replan, ReplanOutcome
 
 SHORT = Limits(perceive_s=0.1, judge_s=0.1, detect_s=0.05, observe_s=0.1, hold_s=0.1)
 
@@ -169,3 +172,29 @@ def test_a_supervisor_leaves_no_thread_behind() -> None:
     del calls
     thread.join(5)
     assert not thread.is_alive()
+
+
+def test_a_replanner_that_takes_a_deadline_is_told_when_its_time_is_over() -> None:
+    told: list[float] = []
+
+    class Stopping:
+        name = "stopping"
+
+        def replan(self, context: object, diagnosis: object, deadline: object = None) -> Replan:
+            assert isinstance(deadline, Deadline)
+            told.append(deadline.left())
+            return Replan(ReplanOutcome.NOT_FOUND)
+
+    class Plain:
+        name = "plain"
+
+        def replan(self, context: object, diagnosis: object) -> Replan:
+            return Replan(ReplanOutcome.NOT_FOUND)
+
+    calls = Supervisor(Limits(replan_s=3.0))
+    for part in (Stopping(), Plain()):
+        asked = AskedReplanner(part)
+        answer = calls.call("strategy", lambda a=asked: a.replan(None, None), "judge")  # type: ignore[misc]
+        assert answer.outcome is ReplanOutcome.NOT_FOUND
+    (left,) = told
+    assert 0 < left <= 0.9 * 3.0

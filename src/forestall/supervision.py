@@ -135,7 +135,8 @@ class _Job:
         with self.lock:
             outer = self.doing[-1].deadline if self.doing else None
             ends_s = time.monotonic() + limit_s
-            self.doing.append(_Doing(part, limit_s, ends_s, Deadline(limit_s, outer)))
+            by_itself = Deadline(_BY_ITSELF * limit_s, outer)
+            self.doing.append(_Doing(part, limit_s, ends_s, by_itself))
             self.lock.notify_all()
 
     def end(self) -> None:
@@ -372,6 +373,9 @@ def _serve(jobs: queue.SimpleQueue[Callable[[], None] | None]) -> None:
     except _Cancelled:
         return
 
+
+_BY_ITSELF = 0.9
+"""Share of a limit after which work that asks its deadline stops: its own answer is the better."""
 
 _STILL = "has not come back since its time ran out"
 _LONGEST = 400

@@ -7,10 +7,12 @@ an answer is made of is looked at here, so that nonsense is an error of the part
 from __future__ import annotations
 
 from collections.abc import Sequence
+from inspect import signature
+from typing import Any
 
 from forestall.domain.model import Domain
 from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
-from forestall.supervision import ask, checked_answer
+from forestall.supervision import ask, checked_answer, deadline
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask
@@ -65,15 +67,20 @@ class AskedReasoner:
 
 
 class AskedReplanner:
-    """Makes a plan within its time."""
+    """Makes a plan within its time; one that takes a `deadline` is told when that is over."""
 
     def __init__(self, replanner: Replanner) -> None:
         self._replanner, self.name = replanner, replanner.name
+        self._stops = "deadline" in signature(replanner.replan).parameters
 
     def replan(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
         """As the replanner."""
-        part = f"replanner {self.name}"
-        return ask(part, "replan", Replan, self._replanner.replan, context, diagnosis)
+
+        def made() -> Replan:
+            until: dict[str, Any] = {"deadline": deadline()} if self._stops else {}
+            return self._replanner.replan(context, diagnosis, **until)
+
+        return ask(f"replanner {self.name}", "replan", Replan, made)
 
 
 class AskedValidator:
