@@ -136,6 +136,16 @@ def test_alarms_in_a_row_hold_where_each_would_be_let_pass() -> None:
     assert decision.why == "3 alarms in a row, and 2 are the most"
 
 
+def test_alarms_of_who_only_watches_hold_nothing() -> None:
+    alarm = replace(GO, verdict=ALARM, watched=(ALARM, ALARM))
+    limits = Limits(max_alarms_in_a_row=1)
+    monitor, _ = started(alarm, alarm, alarm, on_alarm="proceed", limits=limits)
+    monitor.start(type(PLAN)(PLAN.subtasks * 2))
+    for held in ("Mug-2", None, "Mug-2"):
+        assert monitor.before(scene(held)).may_start
+        monitor.after(DONE)
+
+
 def test_new_plans_in_a_row_hold_and_the_last_one_is_not_followed() -> None:
     monitor, _ = started(REPLAN, REPLAN, limits=Limits(max_repairs_in_a_row=1))
     assert monitor.before(scene()).outcome is Outcome.REPLAN

@@ -83,7 +83,8 @@ class Moments:
     ) -> MonitorDecision:
         """What a strategy's answer comes to; a new plan is adopted here."""
         decision = conclude(context, answer, self._config, self._strategy)
-        if why := run.streaks.after(decision, self._config.limits):
+        steps_in = not answer.watched  # who only watches interrupts nothing, and is not interrupted
+        if steps_in and (why := run.streaks.after(decision, self._config.limits)):
             run.streaks = Streaks()
             hold = Hold.TOO_MANY
             return replace(
