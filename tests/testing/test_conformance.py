@@ -4,9 +4,7 @@ from typing import Any
 import numpy as np
 
 from forestall.domain.load import shipped
-from forestall.tasks.files import load_task
 from forestall.testing.conformance import check_environment
-from forestall.testing.symbolic_world import SymbolicWorld
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Subtask
@@ -115,10 +113,3 @@ def test_an_arm_that_lets_go_or_goes_on_after_hold_is_found() -> None:
     assert any("is not refused with a reason" in c for c in deaf)
     assert any("after hold the robot" in c for c in deaf)
     assert any("hold raises" in c for c in check_environment(Failing, 3, STEPS, HOUSEHOLD))
-
-
-def test_a_symbolic_world_conforms() -> None:
-    bench = shipped("bench")
-    task = load_task("glue-peg").task
-    steps = list(task.plan.subtasks[:3])
-    assert check_environment(lambda: SymbolicWorld(bench, task.scene), 3, steps, bench) == []
