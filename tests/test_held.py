@@ -223,6 +223,20 @@ def test_who_interrupts_a_run_finds_the_robot_held(tmp_path: Path) -> None:
     assert len(left.boundaries) == 2  # what was written as it happened
 
 
+def test_a_recorder_that_cannot_write_changes_no_run_and_is_not_complete(tmp_path: Path) -> None:
+    recorder = RunRecorder(tmp_path / "run")
+    (tmp_path / "run").write_text("a file where a folder should be")
+    runtime, _ = _runtime(Fault("close", raises(RuntimeError("never called"))), recorder)
+    loaded = load_task("glue-peg")
+    record = runtime.run(loaded.task, loaded.task.plan, 3)
+    assert record.end is EpisodeEnd.PLAN_FINISHED and not recorder.complete
+    assert record.notes[0].startswith("listener RunRecorder failed in on_start: FileExistsError")
+    again = RunRecorder(tmp_path / "good")
+    runtime, _ = _runtime(Fault("close", raises(RuntimeError("never called"))), again)
+    runtime.run(loaded.task, loaded.task.plan, 3)
+    assert again.complete
+
+
 def test_limits_are_options_of_a_run_and_stand_in_its_record() -> None:
     given = Given.said(["limit.observe_s=7", "limit.max_failures_in_a_row=0"])
     config = run_config(

@@ -122,11 +122,12 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
     demonstrations, memory = None, None
     if needs_memory(prepared.config):
         demonstrations, memory = _memory(work.run.case.task, work.settings)
-    listeners = []
     folder = work.page_folder
-    if folder is not None:
-        listeners.append(RunRecorder(folder, page="index.html"))
+    recorder = None if folder is None else RunRecorder(folder, page="index.html")
+    listeners = [] if recorder is None else [recorder]
     record = run_episode(prepared, demonstrations, listeners, memory, trace, _world(prepared))
+    if recorder is not None and not recorder.complete:
+        raise OSError("; ".join(record.notes))
     if folder is not None:
         dull = not work.run.case.failing and record.success and not alarms(record)
         if work.settings.pages == "telling" and dull:
