@@ -300,9 +300,7 @@ CASES: tuple[Case, ...] = (
         "world",
         "execute",
         gives(REFUSED),
-        kind=TOO_MANY,
-        blamed="monitor",
-        limits={"max_failures_in_a_row": 3},
+        end=EpisodeEnd.STOPPED,
     ),
     Case(
         "world fails in everything",
