@@ -196,8 +196,9 @@ class Monitor:
             if (held := self._moments.too_many(run, run.last.subtask)) is not None:
                 return held
             if self._strategy.looks_after is not LooksAfter.SUBTASK:
+                known = replace(run.last, refused=tuple(run.refused()))
                 try:
-                    answer = self._parts.judge(self._strategy.after_subtask, run.last, told)
+                    answer = self._parts.judge(self._strategy.after_subtask, known, told)
                 except PartError as error:
                     return self._moments.hold_for(error, run.last.subtask)
                 silent = answer.decision is Decision.PROCEED and answer.verdict is None

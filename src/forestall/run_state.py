@@ -43,9 +43,16 @@ class Refusal:
 
 
 def around(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[object]:
-    """What is known of a subtask's arguments: states, and relations that skills are about."""
-    nodes = [n for n in graph.nodes if n.id in subtask.args]
-    found: set[object] = {(n.id, n.states) for n in nodes}
+    """What is known of a subtask's arguments and of what they are in: states, and relations.
+
+    Only relations that skills are about count.
+    """
+    names, pending = set(subtask.args), list(subtask.args)
+    while pending:
+        above = set(graph.parents(pending.pop(), domain.containing)) - names
+        names |= above
+        pending += above
+    found: set[object] = {(n.id, n.states) for n in graph.nodes if n.id in names}
     found |= {
         r
         for r in graph.relations

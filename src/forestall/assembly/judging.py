@@ -179,9 +179,15 @@ def graph_validator(parts: Parts) -> GraphValidator:
     return GraphValidator(parts.domain)
 
 
-def proactive(parts: Parts, *, max_attempts: int = _PROACTIVE) -> Proactive:
-    """Ours: before each subtask."""
-    return _stepping_in(Proactive, parts, max_attempts)
+def proactive(parts: Parts, *, max_attempts: int = _PROACTIVE, repeats: bool = False) -> Proactive:
+    """Ours: before each subtask.
+
+    Args:
+        parts: what it is made of.
+        max_attempts: repairs of one cause.
+        repeats: whether what the robot says was not done is to be done again.
+    """
+    return _stepping_in(partial(Proactive, repeats=repeats), parts, max_attempts)
 
 
 def post_hoc(parts: Parts, *, max_attempts: int = _POST_HOC) -> PostHoc:

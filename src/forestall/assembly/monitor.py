@@ -19,9 +19,17 @@ from forestall.learning.learn import learn
 from forestall.monitor import Monitor as RunMonitor
 from forestall.types.demonstration import Demonstration
 
-DEFAULTS = Given.named({"detector": "preconditions", "segmenter": "given-masks", "states": "given"})
+DEFAULTS = Given.named(
+    {
+        "detector": "preconditions",
+        "segmenter": "given-masks",
+        "states": "given",
+        "strategy.repeats": True,
+    }
+)
 """What a monitor of somebody's own has where nothing is said: it judges by what always held, which
-needs no scene of the same kind; masks and states are those that an observation brings."""
+needs no scene of the same kind; masks and states are those that an observation brings; what the
+robot says was not done is done again."""
 
 
 class Monitor(RunMonitor):

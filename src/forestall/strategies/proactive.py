@@ -10,10 +10,11 @@ from dataclasses import replace
 
 from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
-from forestall.strategies.intervention import Clock, Intervention
-from forestall.types.episode import SkillOutcome
+from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked
+from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
-from forestall.types.verdict import Decision
+from forestall.types.verdict import Decision, Diagnosis, Replan, ReplanOutcome
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
 
@@ -24,6 +25,15 @@ class Proactive:
     Subtasks of the nominal plan are compared with demonstrations of the same point. The steps of a
     repair have no such point: there the rest of the plan is checked on what is seen, by the same
     validator that accepted the repair, and an alarm is raised when it would no longer run.
+
+    Args:
+        retriever: finds the references.
+        detector: judges the scene before a subtask.
+        reasoner: explains.
+        replanner: makes the corrected plan.
+        validator: says whether what is left of a plan runs on what is seen.
+        max_attempts: repairs of one cause.
+        repeats: whether what the robot says was not done is to be done again.
     """
 
     name = "proactive"
@@ -37,15 +47,21 @@ class Proactive:
         replanner: Replanner,
         validator: PlanValidator,
         max_attempts: int = 2,
+        repeats: bool = False,
     ) -> None:
         self._retriever = AskedRetriever(retriever)
         self._detector = AskedDetector(detector)
         self._reasoner = AskedReasoner(reasoner)
         self._intervention = Intervention(replanner, validator, max_attempts)
+        self._repeats = repeats
+        self._max_attempts = max_attempts
+        self._undone: dict[Subtask, int] = {}
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Retrieve, compare; on an alarm diagnose and replan."""
         self._intervention.begin(context)
+        if context.index == 0 and context.replans == 0:
+            self._undone.clear()
         clock = Clock()
         if context.subtask in context.refused:
             return self._intervention.refused(context, clock)
@@ -73,8 +89,24 @@ class Proactive:
         return self._intervention.alarm(context, verdict, diagnosis, clock)
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
-        """Go on: what went wrong shows at the next boundary."""
-        return _GO_ON
+        """Go on, as the paper does: what went wrong shows at the next boundary.
+
+        Where `repeats` is set, what was not done is to be done again: after a failure the same,
+        after a refusal with other things than those that were refused. What is not done in
+        `max_attempts` repetitions is an alarm.
+        """
+        if not self._repeats or outcome.status is SkillStatus.SUCCEEDED:
+            return _GO_ON
+        tried = self._undone[context.subtask] = self._undone.get(context.subtask, 0) + 1
+        why = f"{context.subtask} was {outcome.status.value}"
+        verdict = checked(SKILL_STATUS, False, why)
+        diagnosis = Diagnosis(why, (), culprits=context.subtask.args, producer=self.name)
+        if tried > self._max_attempts:
+            why = f"{why} {tried} times"
+            return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why)
+        again = Plan(context.remaining(), context.plan.goal)
+        replan = Replan(ReplanOutcome.SOLVED, again, producer=self.name)
+        return StrategyAnswer(Decision.REPLAN, verdict, diagnosis, replan, why)
 
     def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
         """Go on: proactive monitoring ends with the last subtask's start."""
