@@ -7,7 +7,8 @@ import pytest
 
 from forestall.assembly.configuration import run_config
 from forestall.assembly.make import prepare
-from forestall.cli.main import app, call
+from forestall.cli.app import app
+from forestall.cli.main import call
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])

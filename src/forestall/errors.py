@@ -19,9 +19,21 @@ import difflib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+_MOST_TOLD, _LAST_TOLD = 1000, 300
+
 
 class ForestallError(Exception):
-    """Base of every error that forestall raises on purpose; its text is one clear line."""
+    """Base of every error that forestall raises on purpose; its text is one clear line.
+
+    Args:
+        text: the line; what is longer, because it quotes what was given, is cut in its middle.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        line = " ".join(str(text).splitlines())
+        if len(line) > _MOST_TOLD:
+            line = f"{line[: _MOST_TOLD - _LAST_TOLD]} ... {line[-_LAST_TOLD:]}"
+        super().__init__(line)
 
 
 class InputError(ForestallError):

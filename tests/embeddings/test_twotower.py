@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from forestall.domain.load import load_domain
-from forestall.embeddings.twotower import DESCRIPTION_NAME, TwoTowerEncoder, shipped
+from forestall.embeddings.twotower import (
+    DESCRIPTION_NAME,
+    Description,
+    TwoTowerEncoder,
+    checksums,
+    shipped,
+)
 from forestall.errors import InputError, ModelFileError
 
 
@@ -20,6 +26,23 @@ def encoder() -> TwoTowerEncoder:
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     return Path(shutil.copytree(shipped(), tmp_path / "encoder"))
+
+
+def unchecked(folder: Path) -> None:
+    """As an encoder whose description was written without checksums."""
+    path = folder / DESCRIPTION_NAME
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"sha256": {}}))
+
+
+def test_the_shipped_towers_have_their_checksums(copy: Path) -> None:
+    description = Description.read(shipped() / DESCRIPTION_NAME)
+    assert description.sha256 == checksums(shipped())
+    path = copy / "text.onnx"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ModelFileError, match=r"text\.onnx is damaged \(its SHA-256"):
+        TwoTowerEncoder(copy)
 
 
 def test_it_is_small_enough_to_ship() -> None:
@@ -81,6 +104,7 @@ def test_a_missing_file_is_named(copy: Path, name: str) -> None:
 
 @pytest.mark.parametrize("kept", [0, 100, 100_000])
 def test_a_damaged_tower_is_named(copy: Path, kept: int) -> None:
+    unchecked(copy)
     path = copy / "image.onnx"
     path.write_bytes(path.read_bytes()[:kept] + b"damage")
     with pytest.raises(ModelFileError, match=r"image\.onnx is damaged"):
@@ -88,18 +112,21 @@ def test_a_damaged_tower_is_named(copy: Path, kept: int) -> None:
 
 
 def test_an_empty_tower_is_named(copy: Path) -> None:
+    unchecked(copy)
     (copy / "image.onnx").write_bytes(b"")
     with pytest.raises(ModelFileError, match=r"image\.onnx is damaged"):
         TwoTowerEncoder(copy)
 
 
 def test_towers_that_were_swapped_are_named(copy: Path) -> None:
+    unchecked(copy)
     shutil.copy(copy / "text.onnx", copy / "image.onnx")
     with pytest.raises(ModelFileError, match=r"image\.onnx is no image tower"):
         TwoTowerEncoder(copy)
 
 
 def test_an_operator_that_this_onnxruntime_lacks_is_named(copy: Path) -> None:
+    unchecked(copy)
     path = copy / "image.onnx"
     data = path.read_bytes()
     assert data.count(b"Relu") > 1

@@ -47,5 +47,5 @@ def test_timings_of_another_kind_are_not_mixed_in(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="repeat 3"):
         measure(4, 0, tmp_path, lambda *_: None)
     (tmp_path / ROWS).write_text("{}\n")
-    with pytest.raises(FileFormatError, match="line 1: not a timing"):
+    with pytest.raises(FileFormatError, match="line 1: the document lacks 'key'"):
         measure(3, 0, tmp_path, lambda *_: None)

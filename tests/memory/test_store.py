@@ -427,3 +427,58 @@ def test_what_something_was_recorded_for_is_kept_with_it_or_not_at_all(path: Pat
         broken.add(replace(ONE, seed=10), "another job")
     with open_store(path) as store:
         assert len(store.recorded()) == 2
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "DROP TABLE steps",
+        "CREATE TRIGGER t AFTER INSERT ON steps BEGIN DELETE FROM demonstrations; END",
+        "CREATE VIEW v AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n) SELECT 1",
+        "ALTER TABLE steps ADD COLUMN more TEXT",
+    ],
+)
+def test_tables_that_are_not_ours_are_not_asked(path: Path, change: str) -> None:
+    """A view may never end, a trigger does what nobody asked for."""
+    filled(path)
+    with sqlite3.connect(path) as other:
+        other.execute(change)
+    other.close()
+    with pytest.raises(MemoryFileError, match="its tables are not those of a memory"):
+        open_store(path)
+
+
+def test_a_column_of_another_type_is_named() -> None:
+    encoded = encode(ONE)
+    with pytest.raises(DamageError, match="its column things holds a str"):
+        decode(replace(encoded, things="{}"), "x", encoded.digest)  # type: ignore[arg-type]
+
+
+def test_what_unpacks_to_more_than_a_document_may_have_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bomb = replace(encode(ONE), things=zlib.compress(b"[" + b"0," * 10**6 + b"0]"))
+    monkeypatch.setattr("forestall.memory.codec.MOST_BYTES", 10**6)
+    with pytest.raises(DamageError, match="unpacks to more than 1000000 bytes"):
+        decode(bomb, "x", bomb.digest)
+
+
+@pytest.mark.parametrize(
+    ("key", "content", "says"),
+    [
+        ("nodes", [[1]], r"things.nodes\[0\]: an object"),
+        ("nodes", [{"id": "A-1", "category": "A", "states": "x"}], r"nodes\[0\].states"),
+        ("nodes", [{"id": "A-1", "category": "A", "pixels": 1.5}], r"nodes\[0\].pixels"),
+        ("relations", [["a", "b"]], r"relations\[0\]: subject, predicate"),
+        ("relations", 7, "relations: a list"),
+        ("format", None, "graphs of format None"),
+    ],
+)
+def test_content_whose_hash_fits_is_looked_at_all_the_same(
+    key: str, content: object, says: str
+) -> None:
+    encoded = encode(ONE)
+    things = json.loads(zlib.decompress(encoded.things)) | {key: content}
+    bad = replace(encoded, things=zlib.compress(json.dumps(things).encode()))
+    with pytest.raises(DamageError, match=says):
+        decode(bad, "x", bad.digest)

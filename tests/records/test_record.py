@@ -80,12 +80,12 @@ def test_a_file_that_is_no_record(tmp_path: Path, text: str, says: str) -> None:
 
 
 def test_no_file_and_no_text(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match="no record of a run"):
+    with pytest.raises(FileFormatError, match="cannot read record of a run"):
         read_record(tmp_path / "nowhere")
-    with pytest.raises(FileFormatError, match="no record of a run"):
+    with pytest.raises(FileFormatError, match="cannot read record of a run"):
         read_record(tmp_path)
     (tmp_path / RECORD_NAME).write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileFormatError, match="not text"):
+    with pytest.raises(FileFormatError, match="not UTF-8 text"):
         read_record(tmp_path)
 
 
@@ -233,7 +233,7 @@ Edit = Callable[[dict[str, Any]], object]
         (lambda d: d["boundaries"][0].update(graph=[]), r"boundaries\[0\].graph"),
         (lambda d: d["boundaries"][0]["graph"].update(nodes=7), r"boundaries\[0\].graph"),
         (lambda d: d["boundaries"][7]["verdict"].update(score="high"), "verdict.score: a number"),
-        (lambda d: d["boundaries"][7]["verdict"].update(threshold=10**400), "threshold: a number"),
+        (lambda d: d["boundaries"][7]["verdict"].update(threshold=10**400), "more than 64"),
         (lambda d: d["boundaries"][7]["verdict"]["matches"].append(["a"]), "a pair"),
         (lambda d: d["boundaries"][7]["diagnosis"].update(must_change=["?"]), "as a fact"),
         (lambda d: d["boundaries"][7]["replan"].update(plan=["fly(Mug)"]), "unknown skill"),
@@ -283,7 +283,7 @@ def test_skills_are_those_of_the_domain_where_that_can_be_known(tmp_path: Path) 
         ("[" * 100_000, "nests too deeply"),
         ('{"kind": "episode", "format": 2, "x": ' + "[" * 90 + "]" * 90 + "}", "nests more than"),
         ('{"kind": "episode", "format": NaN}', "no number"),
-        ('{"kind": "episode", "format": ' + "9" * 5000 + "}", "damaged"),
+        ('{"kind": "episode", "format": ' + "9" * 5000 + "}", "64 bit"),
         ('{"kind": "episode", "format": 2, "task": "\\ud800"}', "half of a character"),
     ],
 )

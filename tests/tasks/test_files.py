@@ -14,6 +14,7 @@ from forestall.tasks.files import (
     schemas,
     task_names,
 )
+from forestall.worlds.kitchen.catalogue import catalogue
 
 TASKS = {
     "heat-potato",
@@ -266,3 +267,40 @@ value = "dirty"
     prepared = prepare(run_config("heat-potato", str(path)))
     assert prepared.scenario is not None
     assert prepared.scenario.moments(prepared.plan) == (0, 7)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("clutter = [0, 2]", f"clutter = [0, {10**300}]", "scene.clutter.* more than 64 bit"),
+        ("clutter = [0, 2]", "clutter = [0, 1000]", "scene.clutter.1: Input should be less than"),
+        ("clutter = [0, 2]", "clutter = [0, 2.0]", "scene.clutter.1"),
+        ('words = "ladle"', "words = 7", "category Ladle: words"),
+        ("size_m = [0.28", 'size_m = ["<script>"', "categories.Ladle.size_m.0"),
+        ("size_m = [0.28", "size_m = [nan", r"categories.Ladle.size_m\[0\]: a finite number"),
+        ('tags = ["pickupable"]', "tags = [2026-01-01]", "a date or time"),
+        ('attributes = ["dirty"]', "attributes = {}", "categories.Ladle.attributes"),
+        ('places = ["CounterTop"]', "places = [[]]", "scene.objects.0.places.0"),
+    ],
+)
+def test_values_of_another_type_are_refused_with_their_place(
+    old: str, new: str, says: str, tmp_path: Path
+) -> None:
+    assert OWN.count(old) == 1
+    file = tmp_path / "own.toml"
+    file.write_text(OWN.replace(old, new))
+    with pytest.raises(InputError, match=says) as caught:
+        load_task(str(file))
+    assert str(caught.value).startswith(str(file))
+
+
+@pytest.mark.parametrize("size", ["1", '[0.28, "x", 0.04]', "[0, 1, 1]", "[0.1, 0.1]", "[9, 9, 9]"])
+def test_a_shape_that_cannot_be_built_is_refused_before_anything_is(
+    size: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "own.toml"
+    text = OWN.replace("size_m = [0.28, 0.06, 0.04]\n", "")
+    file.write_text(text.replace('{ kind = "box" }', f'{{ kind = "box", size_m = {size} }}'))
+    domain = load_task(str(file)).domain
+    with pytest.raises(InputError, match="category Ladle: size_m is width, depth and height"):
+        catalogue(domain)

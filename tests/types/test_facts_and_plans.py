@@ -93,3 +93,16 @@ def test_frames_refuse_what_cannot_be_used(change: dict[str, object], says: str)
     frame()
     with pytest.raises(PerceptionError, match=says):
         frame(**change)
+
+
+@pytest.mark.parametrize("text", ["a(" + " " * 100_000, "a(b)" + " " * 100_000 + "x", "(" * 10_000])
+def test_a_text_of_blanks_is_refused_at_once(text: str) -> None:
+    with pytest.raises(InputError):
+        Subtask.parse(text)
+    with pytest.raises(InputError):
+        Literal.parse(text)
+
+
+def test_an_instance_number_is_one_that_can_be_counted_with() -> None:
+    assert category_of("Mug-²") == "Mug-²"
+    assert category_of("Mug-12") == "Mug"

@@ -54,7 +54,7 @@ def test_image_features_survive_json_where_there_are_any() -> None:
 def test_a_feature_that_cannot_be_read(feature: object) -> None:
     data = kitchen().to_json()
     data["nodes"][0]["feature"] = feature
-    with pytest.raises(FileFormatError, match="broken scene graph"):
+    with pytest.raises(FileFormatError, match=r"nodes\[0\].feature"):
         SceneGraph.from_json(data)
 
 
@@ -69,9 +69,31 @@ def test_a_feature_has_a_direction(feature: bytes) -> None:
     [
         ({"format": 99}, FileFormatError, "format 99"),
         ({"relations": [["Plate-1", "inside", "Oven-1"]]}, InputError, "'Oven-1', which is not"),
-        ({"relations": [["Plate-1", "inside"]]}, FileFormatError, "broken scene graph"),
+        ({"relations": [["Plate-1", "inside"]]}, FileFormatError, r"relations\[0\]: subject, pred"),
         ({"nodes": [{"id": "A-1"}]}, FileFormatError, "category"),
-        ({"nodes": 3}, FileFormatError, "broken scene graph"),
+        ({"nodes": 3}, FileFormatError, "nodes: a list is expected, got 3"),
+        ({"nodes": [{"id": 300 * "a", "category": "A"}]}, FileFormatError, "id: a name"),
+        ({"nodes": [{"id": "", "category": "A"}]}, FileFormatError, "id: a name"),
+        ({"nodes": [{"id": "A-1", "category": None}]}, FileFormatError, "category: a name"),
+        ({"nodes": [{"id": "A-1", "category": "A", "states": ["x"]}]}, FileFormatError, "states"),
+        ({"nodes": [{"id": "A-1", "category": "A", "pixels": -1}]}, FileFormatError, "pixels"),
+        (
+            {"nodes": [{"id": "A-1", "category": "A", "box_m": [[0, 0, 0]]}]},
+            FileFormatError,
+            r"nodes\[0\].box_m: two corners",
+        ),
+        (
+            {"nodes": [{"id": "A-1", "category": "A", "box_m": [[1, 0, 0], [0, 1, 1]]}]},
+            FileFormatError,
+            r"nodes\[0\].box_m: box corners are out of order",
+        ),
+        (
+            {"nodes": [{"id": "A-1", "category": "A", "centroid_m": [1, 2]}]},
+            FileFormatError,
+            "centroid_m: three numbers",
+        ),
+        ({"nodes": [{}] * 2001}, FileFormatError, "at most 2000 are read, got 2001"),
+        ({"subtask": ["pick_up"]}, FileFormatError, "subtask: cannot read"),
         ({"hidden": ["Oven-1"]}, InputError, "Oven-1"),
     ],
 )
@@ -80,6 +102,17 @@ def test_broken_graph_files_are_named(
 ) -> None:
     with pytest.raises(error, match=says):
         SceneGraph.from_json(kitchen().to_json() | change)
+
+
+def test_ids_may_be_numbers() -> None:
+    graph = SceneGraph.from_json(
+        {
+            "format": 1,
+            "nodes": [{"id": 7, "category": "cup"}, {"id": 8, "category": "table"}],
+            "relations": [[7, "on", 8]],
+        }
+    )
+    assert graph.relations == (Relation("7", "on", "8"),)
 
 
 def test_a_graph_carries_relations_of_any_domain() -> None:

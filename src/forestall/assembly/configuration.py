@@ -9,7 +9,6 @@ anything is built.
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +20,7 @@ from forestall.domain.model import Domain
 from forestall.domain.toml_out import domain_toml
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.kinds import DOMAIN
+from forestall.reading.documents import read_toml
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.kind import Kind
 
@@ -123,7 +123,7 @@ class Given:
             elif dot or short:
                 options = {**options, (option or short or ""): value}
             elif isinstance(value, Mapping):
-                name = value.get(NAME, name)
+                name = str(value[NAME]) if NAME in value else name
                 options = {**options, **{k: v for k, v in value.items() if k != NAME}}
             else:
                 name = str(value)
@@ -295,10 +295,7 @@ def read_file(path: Path) -> tuple[Given, dict[str, Any]]:
     Raises:
         FileFormatError: it cannot be read, or says something that is neither.
     """
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FileFormatError(f"cannot read configuration {path}: {error}") from error
+    data = read_toml(path, "configuration")
     run = {key: data.pop(key) for key in RUN_KEYS if key in data}
     types = {"scenario": str, "seed": int, "without": str}
     for key, value in run.items():

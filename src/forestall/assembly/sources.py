@@ -8,7 +8,6 @@ wrote is one JSON file, or one list of steps in Python:
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,8 @@ from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.memory.codec import encode
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
+from forestall.reading.documents import read_json
+from forestall.reading.files import inside
 from forestall.records.record import read_record
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.facts import Literal, is_instance
@@ -206,10 +207,7 @@ def _shows(path: Path) -> bool:
 
 
 def _from_json(path: Path) -> Demonstration:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise FileFormatError(f"cannot read demonstration {path}: {error}") from error
+    data = read_json(path, "demonstration")
     try:
         if isinstance(data, dict) and "steps" in data:
             return written(data, path.parent)
@@ -252,13 +250,7 @@ def _scene(given: Any, folder: Path | None) -> SceneGraph:
         return scene_graph(given)
     if folder is None:
         raise InputError(f"the scene {given!r} is a name: give the scene itself")
-    place = (folder / given).resolve()
-    if not place.is_relative_to(folder.resolve()):
-        raise FileFormatError(f"the scene {given!r} is outside the folder {folder}")
-    try:
-        return scene_graph(json.loads(place.read_text(encoding="utf-8-sig")))
-    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise FileFormatError(f"cannot read scene {place}: {error}") from error
+    return scene_graph(read_json(inside(folder, given), "scene"))
 
 
 def _step(index: int, subtask: Subtask, graph: SceneGraph) -> DemonstrationStep:

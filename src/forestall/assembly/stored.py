@@ -5,7 +5,6 @@ Called by `checking` and the command line; calls the reader of perception.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from forestall.domain.model import Domain
 from forestall.domain.words import Names
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.folder import OBSERVATION_FILE, read_observation
+from forestall.reading.documents import read_json
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.symbolic import scene_graph
@@ -88,15 +88,13 @@ def read_graph(path: Path) -> SceneGraph:
     """A scene graph from a JSON file, whole or in the short form (`types.symbolic`).
 
     Raises:
-        FileFormatError: it cannot be read, or is no scene graph.
-        InputError: it contradicts itself (a dangling relation, an id twice).
+        FileFormatError: it cannot be read, is no scene graph, or contradicts itself.
     """
+    data = read_json(path, "scene graph")
     try:
-        return scene_graph(json.loads(path.read_text(encoding="utf-8-sig")))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise FileFormatError(f"cannot read scene graph {path}: {error}") from error
+        return scene_graph(data)
     except InputError as error:
-        raise type(error)(f"{path}: {error}") from error
+        raise FileFormatError(f"{path}: {error}") from error
 
 
 def _numbered(folder: Path) -> list[Path]:

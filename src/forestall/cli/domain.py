@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from forestall.cli.listing import say
+
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
 
@@ -47,17 +49,17 @@ def show(name: str, /) -> int:
     from forestall.domain.sheet import skill_sheet
 
     found = load_domain(name)
-    print(f"{found.name}: {_sentence(found)}\n")
-    print("categories:")
+    say(f"{found.name}: {_sentence(found)}\n")
+    say("categories:")
     for category in found.categories.values():
         tags = f": {', '.join(sorted(category.tags))}" if category.tags else ""
-        print(f"  {category.name}{tags}")
-    print("\npredicates:")
+        say(f"  {category.name}{tags}")
+    say("\npredicates:")
     for predicate in found.predicates.values():
         values = f" = {' | '.join(predicate.values)}" if predicate.values else ""
         several = ", ".join(map(str, predicate.parameters))
-        print(f"  {predicate.kind.value:<10}{predicate.name}({several}){values}")
-    print(f"\nskills:\n\n{skill_sheet(found)}", end="")
+        say(f"  {predicate.kind.value:<10}{predicate.name}({several}){values}")
+    say(f"\nskills:\n\n{skill_sheet(found)}".rstrip("\n"))
     return 0
 
 
@@ -101,7 +103,7 @@ def check(file: str, /) -> int:
     from forestall.domain.load import load_domain
 
     found = load_domain(file)
-    print(f"ok: {found.name}: {_sentence(found)}")
+    say(f"ok: {found.name}: {_sentence(found)}")
     return 0
 
 
@@ -144,7 +146,7 @@ def export(
         from forestall.domain.json_schema import domain_schema
 
         text = json.dumps(domain_schema(), indent=2) + "\n"
-    print(text, end="")
+    say(text.rstrip("\n"))
     return 0
 
 

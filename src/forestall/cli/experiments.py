@@ -139,6 +139,7 @@ def _show(summary: dict[str, Any], tables: Sequence[Table], folder: Path, as_jso
     from rich.console import Console
 
     from forestall.cli.listing import print_table
+    from forestall.reading.printing import printable
 
     console = Console(highlight=False)
     for table in tables:
@@ -146,8 +147,8 @@ def _show(summary: dict[str, Any], tables: Sequence[Table], folder: Path, as_jso
             console.print(f"\n[bold]{table.title}[/]")
             print_table(table.header, list(table.rows))
     for line in summary["orderings"]:
-        console.print(line["sentence"], soft_wrap=True, markup=False)
+        console.print(printable(line["sentence"]), soft_wrap=True, markup=False)
     for name, value in summary["meta"]["effort"].items():
-        console.print(f"{name}: {value}", soft_wrap=True, markup=False)
+        console.print(printable(f"{name}: {value}"), soft_wrap=True, markup=False)
     print(folder / "index.html")
     return 0

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from forestall.cli.flags import RunFlags, Settings
+from forestall.cli.listing import say
 from forestall.config import DEFAULT_DOMAIN
 
 if TYPE_CHECKING:
@@ -64,11 +65,11 @@ def compare(
             )
         )
         return 0
-    print(f"score {parts.score:.3f}")
+    say(f"score {parts.score:.3f}")
     for name, value in (("node", parts.node), ("edge", parts.edge), ("structure", parts.structure)):
-        print(f"  {name:10s} {'off' if value is None else f'{value:.3f}'}")
+        say(f"  {name:10s} {'off' if value is None else f'{value:.3f}'}")
     for d in result.discrepancies:
-        print(f"  {d.change.value}: {d.text}")
+        say(f"  {d.change.value}: {d.text}")
     return 0
 
 
@@ -236,15 +237,15 @@ def _tell(found: Judgements, page: Path | None) -> None:
     for judgement in found.each:
         decision, record = judgement.decision, judgement.record
         where = f"{judgement.path}: " if several else ""
-        print(f"{where}{decision.outcome.value}: before {record.subtask}")
+        say(f"{where}{decision.outcome.value}: before {record.subtask}")
         for line in _lines(decision):
-            print(f"  {line}")
+            say(f"  {line}")
     if several:
         alarms = sum(j.alarm for j in found.each)
         unclear = sum(not j.judged for j in found.each)
-        print(f"{len(found.each)} scenes: {alarms} with an alarm, {unclear} not judged")
+        say(f"{len(found.each)} scenes: {alarms} with an alarm, {unclear} not judged")
     if page is not None:
-        print(page)
+        say(page)
 
 
 def _lines(decision: MonitorDecision) -> Iterator[str]:

@@ -94,17 +94,27 @@ def scenarios(
     return 0
 
 
+def say(text: object) -> None:
+    """Print what may hold names from files: nothing in it steers the terminal."""
+    from forestall.reading.printing import printable
+
+    print(printable(str(text)))
+
+
 def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
     """Print a plain table with rich."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
+
+    from forestall.reading.printing import printable
 
     table = Table(box=None, pad_edge=False)
     for number, name in enumerate(header):
         short = all(len(row[number]) <= 16 for row in rows)
         table.add_column(name, no_wrap=short, style="bold" if number == 0 else None)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(Text(printable(cell)) for cell in row))
     console = Console()
     if not console.is_terminal:
         console.width = 240

@@ -1,75 +1,88 @@
-"""Entry point of the `forestall` command.
+"""Entry point of the `forestall` command: whatever happens becomes an exit code.
 
 Exit codes: 0 done, and for a run: the task succeeded; 1 the run ended and the task failed, or a
-check raised an alarm; 2 the input was not valid; 3 something else that forestall names (a damaged
-memory, a full disk); 4 a check that could not be judged; 130 interrupted.
+check raised an alarm; 2 what was given is not valid; 3 something else that forestall names (a
+damaged memory or model, a scene without room, a full disk); 4 a check that could not be judged; 70
+a fault of forestall itself; 130 interrupted. Nothing but a command's own answer gives 0, 1 or 4,
+so this file imports only what cannot fail before it may catch.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
-import cyclopts
-from cyclopts import App
-
-import forestall
-from forestall.cli import experiments
-from forestall.cli.bench import bench
-from forestall.cli.demos import demos
-from forestall.cli.doctor import doctor
-from forestall.cli.domain import domain
-from forestall.cli.encoder import encoder
-from forestall.cli.flags import spelt
-from forestall.cli.inspect import check, compare
-from forestall.cli.listing import scenarios, tasks
-from forestall.cli.page import page
-from forestall.cli.parts import parts
-from forestall.cli.run import run
-from forestall.errors import ForestallError, InputError
-
-app = App(
-    name="forestall",
-    help="See a failing subtask coming, explain it, replan, succeed.",
-    version=forestall.__version__,
-    suppress_keyboard_interrupt=False,
-)
-for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
-    app.command(command)
-app.command(demos)
-app.command(domain)
-app.command(bench)
-experiments.register(bench)
-app.command(encoder)
+OF_ITS_OWN = 70  # EX_SOFTWARE
+DEBUG = "--debug"
+VARIABLE = "FORESTALL_DEBUG"
+MOST_TOLD = 2000
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its code."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # what a terminal cannot show is no reason to fail
+            stream.reconfigure(errors="backslashreplace")
     sys.exit(call(arguments))
 
 
 def call(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code; errors are one line on standard error."""
-    given = sys.argv[1:] if arguments is None else arguments
+    """Run the command line and return its exit code; errors are one line on standard error.
+
+    Args:
+        arguments: without the program's name; those of the process by default. `--debug` among
+            them, or FORESTALL_DEBUG=1, shows where an error comes from.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = DEBUG in given or os.environ.get(VARIABLE, "") not in ("", "0")
     try:
-        code = app(
-            list(spelt(given)), exit_on_error=False, print_error=False, result_action="return_value"
-        )
-    except cyclopts.CycloptsError as error:
-        return _fail(" ".join(str(error).split()), 2)
-    except InputError as error:
-        return _fail(str(error), 2)
-    except ForestallError as error:
-        return _fail(str(error), 3)
+        return _answered([argument for argument in given if argument != DEBUG])
     except KeyboardInterrupt:
         return _fail("interrupted", 130)
     except BrokenPipeError:
         return 0
-    except OSError as error:
-        return _fail(str(error), 3)
-    return code if isinstance(code, int) else 0
+    except BaseException as error:  # noqa: BLE001 - a crash must not look like an answer
+        if debug:
+            import traceback
+
+            traceback.print_exception(error)
+        try:
+            return _fail(*_told(error))
+        except Exception:  # noqa: BLE001 - not even that can be said: standard error is gone
+            return OF_ITS_OWN
+
+
+def _answered(arguments: Sequence[str]) -> int:
+    from forestall.cli.app import answer
+
+    code = answer(arguments)
+    sys.stdout.flush()
+    return code
+
+
+def _told(error: BaseException) -> tuple[str, int]:
+    """What is said of an error, and its code."""
+    from forestall.errors import ForestallError, InputError, PerceptionError
+
+    if isinstance(error, InputError | PerceptionError):
+        return str(error), 2
+    if isinstance(error, ForestallError | OSError):
+        return str(error), 3
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    where = ""
+    if place is not None:
+        file = place.tb_frame.f_code.co_filename.replace("\\", "/").rpartition("/")[2]
+        where = f" ({file}, line {place.tb_lineno})"
+    text = f"internal error: {type(error).__name__}: {str(error)[:300]}{where}"
+    how = f"report it with what {DEBUG} shows (README, 'Reporting a fault')"
+    return f"{text}. This is a fault of forestall, not an answer: {how}", OF_ITS_OWN
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"forestall: error: {text}", file=sys.stderr)
+    from forestall.reading.printing import one_line
+
+    print(f"forestall: error: {one_line(text)[:MOST_TOLD]}", file=sys.stderr)
     return code

@@ -100,29 +100,30 @@ def _new_folder(task: str, scenario: str | None, strategy: str, seed: int) -> Pa
 
 def _summary(data: dict[str, Any]) -> None:
     from rich.console import Console
-    from rich.markup import escape
+
+    from forestall.reading.printing import shown
 
     console = Console(highlight=False)
     good = bool(data["success"])
     console.print(
         f"[bold {'green' if good else 'red'}]{'success' if good else 'failed'}[/] "
-        f"{escape(str(data['task']))} · {escape(str(data['scenario'] or 'undisturbed'))} · "
+        f"{shown(str(data['task']))} · {shown(str(data['scenario'] or 'undisturbed'))} · "
         f"{data['strategy']} · seed {data['seed']}"
     )
     for failure in data["failures"]:
-        console.print(f"  not reached: {escape(failure)}")
+        console.print(f"  not reached: {shown(failure)}")
     for alarm in data["alarms"]:
         score = "plan check"
         if alarm["score"] is not None:
             score = f"score {alarm['score']:.2f} < {alarm['threshold']:.2f}"
         console.print(
-            f"  alarm before {escape(alarm['subtask'])}: {score}: {escape(alarm['cause'] or '')}",
+            f"  alarm before {shown(alarm['subtask'])}: {score}: {shown(alarm['cause'] or '')}",
             soft_wrap=True,
         )
     console.print(
         f"  {len(data['executed'])} subtasks, {_count(data['replans'], 'new plan')}, "
         f"{data['simulated_s']:.0f} s of robot time, {data['reasoning_s']:.1f} s of reasoning; "
-        f"states: {escape(str(data['perception']['state_estimator']))}",
+        f"states: {shown(str(data['perception']['state_estimator']))}",
         soft_wrap=True,
     )
     print(data["page"], file=sys.stdout)

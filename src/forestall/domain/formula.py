@@ -97,12 +97,19 @@ _TOKEN = re.compile(r"\s*(\?[A-Za-z_]\w*|[A-Za-z_]\w*(?:-\d+)?|\d+|!=|[(),:=\-])
 _WORDS = ("and", "or", "not", "implies", "some", "every", "fewer", "than", "of")
 
 
+MOST_CHARACTERS = 4000
+MOST_DEPTH = 50
+"""How long and how deep a formula may be."""
+
+
 def parse_formula(text: str) -> Formula:
     """Read the text form.
 
     Raises:
         InputError: the text is no formula; says where it stops being one.
     """
+    if not isinstance(text, str) or len(text) > MOST_CHARACTERS:
+        raise InputError(f"a formula is a text of at most {MOST_CHARACTERS} characters")
     parser = _Parser(text)
     formula = parser.formula()
     parser.end()
@@ -238,10 +245,12 @@ class _Parser:
             self._tokens.append(match[1])
             at = match.end()
         self._at = 0
+        self._depth = 0
 
     def formula(self) -> Formula:
         left = self._either()
         if self._take("implies"):
+            self._deeper()
             return Or((Not(left), self.formula()))
         return left
 
@@ -264,6 +273,17 @@ class _Parser:
         return parts[0] if len(parts) == 1 else kind(tuple(parts))
 
     def _single(self) -> Formula:
+        self._deeper()
+        found = self._unit()
+        self._depth -= 1
+        return found
+
+    def _deeper(self) -> None:
+        self._depth += 1
+        if self._depth > MOST_DEPTH:
+            raise InputError(f"a formula nests more than {MOST_DEPTH} deep")
+
+    def _unit(self) -> Formula:
         if self._take("not"):
             return Not(self._single())
         if self._take("("):
@@ -285,7 +305,7 @@ class _Parser:
         self._need("than")
         bound: int | str
         token, of = self._next("a number"), ""
-        if token.isdigit():
+        if token.isdecimal():
             bound = int(token)
         else:
             bound = token

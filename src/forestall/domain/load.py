@@ -7,7 +7,6 @@ whole or not at all: the first thing that is wrong is named with file, line and 
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cache
@@ -23,7 +22,10 @@ from forestall.domain.phrases import attribute_values, check_apart, check_text, 
 from forestall.domain.phrases import table as as_table
 from forestall.domain.schema import Category, Predicate, PredicateKind, Robot, Roles
 from forestall.domain.schemas_in import parameter, read_process, read_safety, read_skill
-from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.domain.shape import check_shape
+from forestall.errors import InputError, UnknownNameError
+from forestall.reading.documents import MOST_TOML_BYTES, parse_toml
+from forestall.reading.files import read_text
 
 _TABLES = (
     "name", "tags", "roles", "robot", "predicates", "attributes", "categories", "events",
@@ -82,10 +84,7 @@ def load_domain(name_or_file: str) -> Domain:
         return load_pddl(name_or_file)
     if not name_or_file.endswith(".toml"):
         return shipped(name_or_file)
-    try:
-        text = Path(name_or_file).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"cannot read domain file {name_or_file}: {error}") from error
+    text = read_text(Path(name_or_file), "domain file", MOST_TOML_BYTES)
     return read_domain(text, name_or_file)
 
 
@@ -93,13 +92,10 @@ def read_domain(text: str, source: str) -> Domain:
     """Build a domain from the text of its file.
 
     Raises:
-        FileFormatError: no TOML.
+        FileFormatError: no TOML as `reading` takes it.
         DomainError: something in it is wrong; with its line.
     """
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(f"{source}: not valid TOML: {error}") from error
+    data = parse_toml(text, source)
     try:
         return build_domain(data)
     except InputError as error:
@@ -113,6 +109,7 @@ def build_domain(data: Mapping[str, Any]) -> Domain:
         InputError: something is wrong.
     """
     _known("domain file", data, _TABLES)
+    check_shape(data)
     name = data.get("name")
     if not isinstance(name, str) or not name:
         raise InputError("domain file: name must be a text")
@@ -156,6 +153,7 @@ def extend(domain: Domain, categories: Mapping[str, Any], attributes: Mapping[st
     Raises:
         InputError: a field, tag, attribute, value or category that does not exist.
     """
+    check_shape({"categories": categories, "attributes": attributes})
     predicates = dict(domain.predicates)
     for name, table in as_table("attributes", attributes).items():
         predicates[name] = _keyed_call(f"[attributes.{name}", _attribute, name, table, domain)
@@ -238,8 +236,6 @@ def _attribute(name: str, table: Any, domain: Domain) -> Predicate:
         raise InputError(f"{label}: the name must be lower-case letters a-z, joined by '_'")
     values = attribute_values(label, table.get("values", () if base is None else base.values))
     camera = table.get("camera", True if base is None else base.camera)
-    if not isinstance(camera, bool):
-        raise InputError(f"{label}: camera must be true or false")
     if base is not None and (values, camera) != (base.values, base.camera):
         raise InputError(
             f"{label} exists: its values ({', '.join(base.values)}) and camera = "
@@ -306,7 +302,7 @@ def _category(name: str, table: Any, domain: Domain, base: Category | None) -> C
         check_text(f"{label}: words", table["words"])
     synonyms = texts(f"{label}: synonyms", table.get("synonyms", ()))
     extra: dict[str, Any] = dict(as_table(f"{label}: world", table.get("world", {})))
-    extra |= {f"#{p}": tuple(table[p]) for p in statics if p in table}
+    extra |= {f"#{p}": _names(label, p, table) for p in statics if p in table}
     old = base or Category(name)
     return Category(
         name,

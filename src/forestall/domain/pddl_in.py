@@ -29,7 +29,9 @@ from forestall.domain.pddl_text import (
     unknown,
     words,
 )
-from forestall.errors import DomainError, FileFormatError, InputError
+from forestall.errors import DomainError, InputError
+from forestall.reading.documents import MOST_TOML_BYTES
+from forestall.reading.files import read_text
 from forestall.types.facts import Literal
 
 SUPPORTED = (
@@ -65,10 +67,7 @@ def load_pddl(path: str) -> Domain:
 
 
 def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"cannot read domain file {path}: {error}") from error
+    return read_text(path, "domain file", MOST_TOML_BYTES)
 
 
 def read_pddl(

@@ -5,7 +5,6 @@ Called by `pddl_in`; calls `formula`. It names things as this project does: lowe
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
@@ -15,7 +14,8 @@ from forestall.domain.formula import parse_formula, show
 from forestall.domain.load import ATTRIBUTE_FIELDS, CATEGORY_FIELDS, PREDICATE_FIELDS
 from forestall.domain.located import keyed, located
 from forestall.domain.phrases import table as as_table
-from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.errors import InputError, UnknownNameError
+from forestall.reading.documents import parse_toml
 
 
 def _but(names: Iterable[str], *given_by_pddl: str) -> tuple[str, ...]:
@@ -52,10 +52,7 @@ class Notes:
             FileFormatError: no TOML.
             DomainError: an unknown field, or an attribute whose values are not given.
         """
-        try:
-            tables = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise FileFormatError(f"{source}: not valid TOML: {error}") from error
+        tables = parse_toml(text, source)
         try:
             _fields("annotations", tables, (*_WHOLE, *_FIELDS))
             for section, known in _FIELDS.items():

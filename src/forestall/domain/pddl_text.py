@@ -16,6 +16,9 @@ _TOKEN = re.compile(r";[^\n]*|[()]|[^\s();]+")
 _TOP = (":action", ":derived", ":goal", ":init", ":predicates")
 _NAME = re.compile(r"\??[a-z_][a-z0-9_]*")
 
+MOST_DEPTH = 64
+"""How deep parentheses may nest."""
+
 ROOT = "object"
 """The type of whatever has no other."""
 
@@ -62,6 +65,11 @@ class Group:
 Node = Word | Group
 
 
+def _check_depth(stack: Sequence[object], line: int) -> None:
+    if len(stack) > MOST_DEPTH:
+        raise AtLineError(line, f"it nests more than {MOST_DEPTH} deep")
+
+
 def parse_pddl(text: str) -> Group:
     """The one expression of a PDDL text.
 
@@ -81,6 +89,7 @@ def parse_pddl(text: str) -> Group:
             raise AtLineError(line, f"{token!r} stands after the end of (define ...)")
         if token == "(":
             stack.append((line, []))
+            _check_depth(stack, line)
         elif not stack:
             raise AtLineError(line, f"a PDDL file begins with (define, not with {token!r}")
         elif token == ")":

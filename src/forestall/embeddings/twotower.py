@@ -8,10 +8,10 @@ docs/encoder.md.
 
 from __future__ import annotations
 
-import json
+import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,18 @@ import numpy.typing as npt
 from forestall.embeddings.crops import INPUT_PIXELS, crops, whole
 from forestall.embeddings.remembered import CropRows, TextRows, Vectors
 from forestall.embeddings.tokens import tokens, words
-from forestall.errors import InputError, ModelFileError
+from forestall.errors import FileFormatError, InputError, ModelFileError
+from forestall.reading.documents import read_json
+from forestall.reading.fields import Field
+from forestall.reading.files import read_bytes
 from forestall.types.encoder import StateReading
 from forestall.types.observation import Mask, Rgb
 
 FORMAT = 1
 DESCRIPTION_NAME = "encoder.json"
 TOWERS = ("image", "text")
+TOWER_FILES = tuple(f"{tower}.onnx" for tower in TOWERS)
+MOST_BYTES = 2**29
 _REMEDY = "reinstall forestall, or train one with `forestall encoder train`"
 
 
@@ -41,12 +46,14 @@ class Description:
         known: words that training has seen.
         reading: how cosines are turned into answers.
         training: how it was made.
+        sha256: of each tower's file, {} where nobody wrote it down.
     """
 
     name: str
     known: frozenset[str]
     reading: StateReading
     training: Mapping[str, Any]
+    sha256: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """What the file holds."""
@@ -55,6 +62,7 @@ class Description:
             "name": self.name,
             "reading": asdict(self.reading),
             "training": dict(self.training),
+            "sha256": dict(self.sha256),
             "known": sorted(self.known),
         }
 
@@ -65,22 +73,39 @@ class Description:
         Raises:
             ModelFileError: it is not there or does not say what it should.
         """
+        if not path.is_file():
+            raise ModelFileError(f"there is no encoder at {path}: {_REMEDY}")
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
+            data = Field(read_json(path, "description of an encoder"))
+            if data["format"].value != FORMAT:
                 raise ModelFileError(
-                    f"{path} has format {data['format']}, this version reads {FORMAT}: {_REMEDY}"
+                    f"{path} has format {data['format'].value}, this version reads {FORMAT}: "
+                    f"{_REMEDY}"
                 )
             return cls(
-                str(data["name"]),
-                frozenset(data["known"]),
-                StateReading(**data["reading"]),
-                dict(data["training"]),
+                data["name"].text(),
+                frozenset(data["known"].tuple_of(Field.text)),
+                _reading(data["reading"]),
+                dict(data["training"].pairs(lambda f: f.value)),
+                dict(data.optional("sha256", lambda f: f.pairs(Field.text)) or ()),
             )
-        except FileNotFoundError as error:
-            raise ModelFileError(f"there is no encoder at {path}: {_REMEDY}") from error
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, InputError) as error:
-            raise ModelFileError(f"{path} cannot be read ({error!r}): {_REMEDY}") from error
+        except (InputError, TypeError) as error:
+            raise ModelFileError(f"{path} cannot be read ({error}): {_REMEDY}") from error
+
+
+def _reading(field: Field) -> StateReading:
+    temperature, threshold = (
+        dict(field.optional(key, lambda f: f.pairs(Field.number)) or ())
+        for key in ("temperature", "threshold")
+    )
+    found = StateReading(field["scale"].number(), temperature, threshold)
+    least_area = field.optional("least_area", Field.whole)
+    return found if least_area is None else replace(found, least_area=least_area)
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """SHA-256 of each tower's file, as it stands in the description beside them."""
+    return {n: hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in TOWER_FILES}
 
 
 def shipped() -> Path:
@@ -105,7 +130,8 @@ class TwoTowerEncoder:
         self.name = self.description.name
         self.reading = self.description.reading
         threads = threads or min(os.cpu_count() or 1, 4)
-        self._image, self._text = (_open(folder / f"{tower}.onnx", threads) for tower in TOWERS)
+        sha256 = self.description.sha256
+        self._image, self._text = (_open(folder / n, sha256.get(n), threads) for n in TOWER_FILES)
         self._check_towers(folder)
         width = int(self._image.get_outputs()[0].shape[-1])
         self._texts = TextRows(self._texts_anew, width)
@@ -174,14 +200,22 @@ class TwoTowerEncoder:
         return self.encode_pixels(crops(rgb, masks))
 
 
-def _open(path: Path, threads: int) -> Any:
-    """An onnxruntime session.
+def _open(path: Path, sha256: str | None, threads: int) -> Any:
+    """An onnxruntime session over the bytes whose checksum was looked at, and no other file.
 
     Raises:
         ModelFileError: see `TwoTowerEncoder`.
     """
     if not path.is_file():
         raise ModelFileError(f"there is no encoder at {path}: {_REMEDY}")
+    try:
+        data = read_bytes(path, "model", MOST_BYTES)
+    except FileFormatError as error:
+        raise ModelFileError(f"{error}: {_REMEDY}") from error
+    if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
+        raise ModelFileError(
+            f"{path} is damaged (its SHA-256 is not the one in {DESCRIPTION_NAME}): {_REMEDY}"
+        )
     try:
         import onnxruntime
     except ImportError as error:
@@ -198,7 +232,7 @@ def _open(path: Path, threads: int) -> Any:
     # threads that spin while they wait slow down the other processes of a survey
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except (states.NotImplemented, states.InvalidGraph) as error:
         raise ModelFileError(
             f"onnxruntime {onnxruntime.__version__} cannot run {path} ({_first_line(error)}): "

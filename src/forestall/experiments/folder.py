@@ -21,8 +21,11 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Choice
+from forestall.experiments.stored import AnyAbout, Call, ExperimentAbout, ExperimentCall, lines_of
 from forestall.files import alone, make_folder, replace_file
 from forestall.fingerprint import ROW_MAKING, sources_digest, weights_of
+from forestall.reading.documents import read_json
+from forestall.reading.models import validated
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
 EXPERIMENT = "experiment"
@@ -31,6 +34,7 @@ ROWS = "episodes.jsonl"
 EFFORT = "effort.jsonl"
 
 R = TypeVar("R", bound="Row")
+C = TypeVar("C", bound=Call)
 
 
 class Row(Protocol):
@@ -125,16 +129,15 @@ class ResultsFolder(Generic[R]):
         if not file.exists():
             what = "holds no experiment" if self.path.is_dir() else "is no folder"
             raise FileFormatError(f"{self.path} {what}")
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise FileFormatError(f"{file}: no experiment: {error}") from error
+        data = read_json(file, "description of results")
         if not isinstance(data, dict) or data.get("kind") != self._kind:
             raise FileFormatError(f"{file}: no {self._kind}")
-        if self._kind == EXPERIMENT and "parts" not in data.get("settings", {}):
+        settings = data.get("settings")
+        if self._kind == EXPERIMENT and isinstance(settings, dict) and "parts" not in settings:
             raise FileFormatError(
                 f"{file}: results of an earlier version; run the experiment again"
             )
+        validated(ExperimentAbout if self._kind == EXPERIMENT else AnyAbout, data, str(file))
         return data
 
     def rows(self, mend: bool = False) -> dict[str, R]:
@@ -150,15 +153,15 @@ class ResultsFolder(Generic[R]):
         file = self.path / ROWS
         if not file.exists():
             return {}
-        whole, newline, half = file.read_text(encoding="utf-8").rpartition("\n")
+        lines, whole, half = lines_of(file)
         if half and mend:
-            replace_file(file, (whole + newline).encode())
+            replace_file(file, whole.encode())
         rows = {}
-        for number, line in enumerate(whole.splitlines(), 1):
+        for place, data in lines:
             try:
-                row = self._read(json.loads(line))
-            except (ValueError, AttributeError, FileFormatError) as error:
-                raise FileFormatError(f"{file}, line {number}: {error}") from error
+                row = self._read(data)
+            except FileFormatError as error:
+                raise FileFormatError(f"{place}: {error}") from error
             rows[row.key] = row
         return rows
 
@@ -223,39 +226,38 @@ class ResultsFolder(Generic[R]):
 
     def effort(self) -> dict[str, str]:
         """How long the episodes took, and on which machines, in words."""
-        calls = self._calls()
+        calls = self._calls(Call)
         if not calls:
             return {}
-        seconds = sum(c["seconds"] for c in calls)
+        seconds = sum(c.seconds for c in calls)
         return {
-            "duration": f"{seconds / 60:.0f} min for {sum(c['episodes'] for c in calls)} episodes "
+            "duration": f"{seconds / 60:.0f} min for {sum(c.episodes for c in calls)} episodes "
             "and their demonstrations, in the calls of the command that came to an end",
-            "machine": "; ".join(sorted({c["machine"] for c in calls})),
-            "jobs": ", ".join(sorted({f"{c['jobs']} ({c['engine']})" for c in calls})),
-            "date": ", ".join(sorted({c["date"] for c in calls})),
+            "machine": "; ".join(sorted({c.machine for c in calls})),
+            "jobs": ", ".join(sorted({f"{c.jobs} ({c.engine})" for c in calls})),
+            "date": ", ".join(sorted({c.date for c in calls})),
         }
 
     def asked(self) -> list[Choice]:
         """What the command was called for, each once."""
         choices = [
             Choice(
-                c["experiment"],
-                c["split"],
-                c["rounds"],
-                c["limit"],
-                tuple(c["sets"]),
-                tuple(c["strategies"]),
+                c.experiment,
+                c.split,
+                c.rounds,
+                c.limit,
+                tuple(c.sets),
+                tuple(c.strategies),
             )
-            for c in (call["choice"] for call in self._calls())
+            for c in (call.choice for call in self._calls(ExperimentCall))
         ]
         return list(dict.fromkeys(choices))
 
-    def _calls(self) -> list[dict[str, Any]]:
+    def _calls(self, model: type[C]) -> list[C]:
         file = self.path / EFFORT
         if not file.exists():
             return []
-        lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
-        return [json.loads(line) for line in lines if line.endswith("\n")]
+        return [validated(model, data, place) for place, data in lines_of(file)[0]]
 
     def _claim(self) -> None:
         """See that the folder can be one of results, and make it."""

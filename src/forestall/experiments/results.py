@@ -10,11 +10,12 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from forestall.errors import FileFormatError
+from forestall.errors import FileFormatError, InputError
 from forestall.experiments.folder import ResultsFolder, episodes_in
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
 from forestall.files import replace_file
+from forestall.kinds import CAPTIONER, IMAGE_ENCODER
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import CASE_SETS, cases
 from forestall.statistics.findings import findings
@@ -40,6 +41,36 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
     Raises:
         FileFormatError: it holds no experiment, or no episode.
     """
+    data, rows, meta, names = summary_of(path)
+    made = tables(data)
+    replace_file(path / SUMMARY, (json.dumps(data, indent=1) + "\n").encode())
+    links = {
+        row.key: f"{PAGES}/{row.key}/index.html"
+        for row in rows
+        if (path / PAGES / row.key / "index.html").exists()
+    }
+    told = {
+        "title": f"Experiments on the {meta['split']} split",
+        **{k: v for k, v in meta.items() if k not in ("settings", "effort")},
+        **{kind: _said(part) for kind, part in meta["settings"]["parts"].items()},
+        "episodes": f"{len(rows)}, {sum(not r.implied for r in rows)} of them executed, in "
+        f"{sum(sum(r.compute_s.values()) for r in rows) / 3600:.1f} h of one worker",
+        **meta["effort"],
+        "findings": findings(data),
+        "names": names,
+    }
+    write_experiment(path, rows, data, made, told, links)
+    return data, made
+
+
+def summary_of(
+    path: Path,
+) -> tuple[dict[str, Any], list[EpisodeRow], dict[str, Any], dict[str, str]]:
+    """Summary, rows, what all have in common, and how detectors are called.
+
+    Raises:
+        FileFormatError: see `present`.
+    """
     folder = episodes_in(path)
     about = folder.about()
     rows = list(folder.rows().values())
@@ -54,27 +85,13 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
         "settings": about["settings"],
         "effort": folder.effort(),
     }
-    notes = _missing(folder, about, {row.key for row in rows})
-    data = summarised(rows, meta, notes, names)
-    made = tables(data)
-    replace_file(path / SUMMARY, (json.dumps(data, indent=1) + "\n").encode())
-    links = {
-        row.key: f"{PAGES}/{row.key}/index.html"
-        for row in rows
-        if (path / PAGES / row.key / "index.html").exists()
-    }
-    told = {
-        "title": f"Experiments on the {about['split']} split",
-        **{k: v for k, v in meta.items() if k not in ("settings", "effort")},
-        **{kind: _said(part) for kind, part in about["settings"]["parts"].items()},
-        "episodes": f"{len(rows)}, {sum(not r.implied for r in rows)} of them executed, in "
-        f"{sum(sum(r.compute_s.values()) for r in rows) / 3600:.1f} h of one worker",
-        **meta["effort"],
-        "findings": findings(data),
-        "names": names,
-    }
-    write_experiment(path, rows, data, made, told, links)
-    return data, made
+    try:
+        notes = _missing(folder, about, {row.key for row in rows})
+    except FileFormatError:
+        raise
+    except InputError as error:  # names that this version does not know
+        raise FileFormatError(f"{path}: {error}") from error
+    return summarised(rows, meta, notes, names), rows, meta, names
 
 
 def _missing(
@@ -97,7 +114,8 @@ def _missing(
 def shown_names(settings: dict[str, Any]) -> dict[str, str]:
     """How detectors are called; offline stand-ins are called stand-ins."""
     parts = settings["parts"]
-    used = {"image": parts["image-encoder"]["name"], "caption": parts["captioner"]["name"]}
+    made_by = {"image": IMAGE_ENCODER.name, "caption": CAPTIONER.name}
+    used = {d: parts[kind]["name"] for d, kind in made_by.items() if kind in parts}
     return {d: STAND_INS[d, w] for d, w in used.items() if (d, w) in STAND_INS}
 
 

@@ -23,13 +23,14 @@ from forestall.assembly.make import make_world, prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.comparison.timing import score_times
 from forestall.domain.model import Domain
-from forestall.errors import FileFormatError, ForestallError
+from forestall.errors import ForestallError
 from forestall.experiments import yard
 from forestall.experiments.conduct import Progress
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
 from forestall.kinds import PERCEIVER, REPLANNER, SEGMENTER
 from forestall.planning.planner import plan_goal
+from forestall.reading.fields import Field
 from forestall.seams import OpenWorld, Replanner
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.episode import EpisodeRecord
@@ -86,10 +87,21 @@ class Timed:
         Raises:
             FileFormatError: fields that do not fit.
         """
-        try:
-            return cls(data["key"], tuple(data["rows"]), data["machine"])
-        except (TypeError, KeyError) as error:
-            raise FileFormatError(f"not a timing of this version: {error}") from error
+        field = Field(data)
+        return cls(
+            field["key"].text(),
+            field["rows"].tuple_of(_row_from),
+            dict(field["machine"].pairs(lambda f: f.value)),
+        )
+
+
+def _row_from(field: Field) -> dict[str, Any]:
+    for name in ("what", "unit"):
+        field[name].text()
+    for name in ("median", "least", "most"):
+        field[name].number()
+    field.maybe("aim", Field.number)
+    return dict(field.pairs(lambda f: f.value))
 
 
 def measure(repeat: int, seed: int, out: Path, progress: Progress) -> dict[str, Any]:

@@ -13,17 +13,28 @@ import base64
 import hashlib
 import json
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 from forestall.errors import ForestallError, InputError
+from forestall.reading.documents import parse_json
+from forestall.reading.fields import Field
+from forestall.reading.files import MOST_BYTES
+from forestall.records.verdicts import view_from
 from forestall.types.demonstration import Demonstration, DemonstrationStep, View
 from forestall.types.feature import whole_numbers
-from forestall.types.graph import GRAPH_FORMAT, Box, ObjectNode, Relation, SceneGraph, Seen
-from forestall.types.observation import Vec3
+from forestall.types.graph import (
+    GRAPH_FORMAT,
+    ObjectNode,
+    Relation,
+    SceneGraph,
+    node_from,
+    relation_from,
+)
 from forestall.types.plan import Subtask
+
+T = TypeVar("T")
 
 
 class DamageError(ForestallError):
@@ -125,35 +136,38 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
     Raises:
         DamageError: the content is not what was written.
     """
+    _check_types(encoded, name)
     if encoded.digest != digest:
         raise DamageError(f"demonstration {name} is damaged: its content does not fit its hash")
     try:
-        things = _unpack(encoded.things)
-        if things["format"] != GRAPH_FORMAT:
+        things = Field(_unpack(encoded.things), "things")
+        if things["format"].value != GRAPH_FORMAT:
             raise DamageError(
-                f"demonstration {name} has graphs of format {things['format']!r}: "
+                f"demonstration {name} has graphs of format {things['format'].value!r}: "
                 f"this version reads {GRAPH_FORMAT}"
             )
-        nodes = [_node(n) for n in things["nodes"]]
-        relations = [Relation(s, p, o) for s, p, o in things["relations"]]
-        subtasks: dict[str, Subtask] = {}
-        views = [_view(v) for v in things.get("views", [None] * len(encoded.steps))]
-        final = things.get("final")
+        shared = _Shared(
+            things["nodes"].tuple_of(node_from), things["relations"].tuple_of(relation_from), {}
+        )
+        views = things.find("views")
+        looks = [None] * len(encoded.steps) if views is None else views.tuple_of(_view)
+        if len(looks) != len(encoded.steps):
+            raise DamageError(f"it has {len(encoded.steps)} steps and {len(looks)} views")
         steps = tuple(
             DemonstrationStep(
                 index=s.index,
-                subtask=_subtask(s.subtask, subtasks),
-                graph=_graph(_unpack(s.graph), nodes, relations, subtasks),
-                whole=_graph(_unpack(s.whole), nodes, relations, subtasks),
+                subtask=shared.subtask(s.subtask),
+                graph=_graph(Field(_unpack(s.graph), f"step {s.index}"), shared),
+                whole=_graph(Field(_unpack(s.whole), f"step {s.index}, whole"), shared),
                 image=s.image,
                 view=view,
             )
-            for s, view in zip(encoded.steps, views, strict=True)
+            for s, view in zip(encoded.steps, looks, strict=True)
         )
-        last = None if final is None else _graph(final, nodes, relations, subtasks)
-        perception = tuple((str(k), str(v)) for k, v in json.loads(encoded.perception))
-    except (zlib.error, ValueError, KeyError, IndexError, TypeError, InputError) as error:
-        raise DamageError(f"demonstration {name} is damaged: {error!r}") from error
+        last = things.optional("final", lambda f: _graph(f, shared))
+        perception = Field(parse_json(encoded.perception), "perception").tuple_of(_pair)
+    except (zlib.error, InputError, DamageError) as error:
+        raise DamageError(f"demonstration {name} is damaged: {error}") from error
     return Demonstration(
         task=encoded.task,
         scene=encoded.scene,
@@ -166,6 +180,27 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
     )
 
 
+def _check_types(encoded: Encoded, name: str) -> None:
+    """A file that is no longer what was written may have anything in a column."""
+    columns: list[tuple[str, Any, type | tuple[type, ...]]] = [
+        (key, getattr(encoded, key), str) for key in ("task", "scene", "version", "perception")
+    ]
+    columns += [("seed", encoded.seed, int), ("things", encoded.things, bytes)]
+    for s in encoded.steps:
+        columns += [
+            ("number", s.index, int),
+            ("subtask", s.subtask, str),
+            ("graph", s.graph, bytes),
+        ]
+        columns += [("whole", s.whole, bytes), ("image", s.image, (str, type(None)))]
+    for column, value, kind in columns:
+        if not isinstance(value, kind):
+            raise DamageError(
+                f"demonstration {name} is damaged: its column {column} holds a "
+                f"{type(value).__name__}"
+            )
+
+
 def _view_json(view: View) -> dict[str, str | None]:
     image = None if view.image is None else base64.b64encode(view.image).decode("ascii")
     return {
@@ -176,76 +211,64 @@ def _view_json(view: View) -> dict[str, str | None]:
     }
 
 
-def _view(data: dict[str, Any] | None) -> View | None:
-    if data is None:
-        return None
-    texts = (data["caption"], data["encoder"], data["captioner"])
-    if not all(isinstance(t, str) for t in texts):
-        raise DamageError("a stored view is no view")
-    image = data["image"]
-    if image is not None:
-        image = base64.b64decode(image, validate=True)
-        whole_numbers(image)
-    return View(image, *texts)
+def _view(field: Field) -> View | None:
+    view = None if field.value is None else view_from(field)
+    if view is not None and view.image is not None:
+        whole_numbers(view.image)
+    return view
 
 
-def _node(data: dict[str, Any]) -> ObjectNode:
-    box, centroid, feature = data["box_m"], data["centroid_m"], data.get("feature")
-    return ObjectNode(
-        id=data["id"],
-        category=data["category"],
-        states=tuple(data["states"].items()),
-        centroid_m=None if centroid is None else _vec(centroid),
-        box_m=None if box is None else Box(_vec(box[0]), _vec(box[1])),
-        seen=Seen(data["seen"]),
-        pixels=data["pixels"],
-        last_seen_s=data["last_seen_s"],
-        feature=None if feature is None else base64.b64decode(feature, validate=True),
-    )
+def _pair(field: Field) -> tuple[str, str]:
+    both = field.items()
+    if len(both) != 2:
+        field.fail("a pair")
+    return both[0].text(), str(both[1].value)
 
 
-def _vec(values: Sequence[float]) -> Vec3:
-    x, y, z = values
-    return (x, y, z)
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """What the graphs of one run share."""
+
+    nodes: tuple[ObjectNode, ...]
+    relations: tuple[Relation, ...]
+    subtasks: dict[str, Subtask]
+
+    def subtask(self, text: str) -> Subtask:
+        found = self.subtasks.get(text)
+        if found is None:
+            found = self.subtasks[text] = Subtask.parse(text)
+        return found
 
 
-def _graph(
-    data: dict[str, Any],
-    nodes: Sequence[ObjectNode],
-    relations: Sequence[Relation],
-    subtasks: dict[str, Subtask],
-) -> SceneGraph:
+def _graph(field: Field, shared: _Shared) -> SceneGraph:
     """A graph from rising positions; checks what `SceneGraph` checks, without sorting again."""
-    node_positions, relation_positions = data["nodes"], data["relations"]
-    _check_rising(node_positions)
-    _check_rising(relation_positions)
-    mine = tuple([nodes[i] for i in node_positions])
-    links = tuple([relations[i] for i in relation_positions])
-    hidden = tuple(data["hidden"])
+    mine = _at(field["nodes"], shared.nodes)
+    links = _at(field["relations"], shared.relations)
+    hidden = field["hidden"].tuple_of(Field.name)
     ids = {n.id for n in mine}
     if len(ids) != len(mine) or not ids.issuperset(hidden):
         raise DamageError("a stored graph contradicts itself")
     if not all(r.subject in ids and r.object in ids for r in links):
         raise DamageError("a stored relation names a node that is not there")
     graph = object.__new__(SceneGraph)
-    text = data["subtask"]
     object.__setattr__(graph, "nodes", mine)
     object.__setattr__(graph, "relations", links)
-    object.__setattr__(graph, "subtask", None if text is None else _subtask(text, subtasks))
+    subtask = field.maybe("subtask", lambda f: shared.subtask(f.text()))
+    object.__setattr__(graph, "subtask", subtask)
     object.__setattr__(graph, "hidden", hidden)
     return graph
 
 
-def _check_rising(positions: Sequence[int]) -> None:
-    if positions and (positions[0] < 0 or any(a >= b for a, b in pairwise(positions))):
+def _at(field: Field, things: tuple[T, ...]) -> tuple[T, ...]:
+    """The things at rising positions."""
+    positions = field.value
+    if not isinstance(positions, list) or not all(type(p) is int for p in positions):
+        field.fail("a list of positions")
+    if positions and (positions[0] < 0 or positions[-1] >= len(things)):
+        raise DamageError("a stored graph names what is not there")
+    if any(a >= b for a, b in pairwise(positions)):
         raise DamageError("a stored graph is out of order")
-
-
-def _subtask(text: str, known: dict[str, Subtask]) -> Subtask:
-    found = known.get(text)
-    if found is None:
-        found = known[text] = Subtask.parse(text)
-    return found
+    return tuple([things[i] for i in positions])
 
 
 def _dump(data: Any) -> str:
@@ -257,4 +280,12 @@ def _pack(data: Any) -> bytes:
 
 
 def _unpack(blob: bytes) -> Any:
-    return json.loads(zlib.decompress(blob))
+    """What `_pack` packed; never more than a document may have, whatever it would unpack to."""
+    unpacking = zlib.decompressobj()
+    data = unpacking.decompress(blob, MOST_BYTES)
+    if unpacking.unconsumed_tail or not unpacking.eof:
+        raise DamageError(f"it is cut off, or unpacks to more than {MOST_BYTES} bytes")
+    try:
+        return parse_json(data.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise DamageError("it is no text") from error

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from forestall.errors import InputError, MemoryFileError
+from forestall.errors import FileFormatError, InputError, MemoryFileError
 from forestall.files import whole_file
+from forestall.reading.pictures import read_picture
 from forestall.types.observation import Rgb
 
 _HASH = re.compile(r"^[0-9a-f]{32}$")
@@ -57,17 +58,14 @@ class ImageFolder:
         Raises:
             MemoryFileError: there is none, or the file is damaged.
         """
-        from PIL import Image, UnidentifiedImageError
-
         if not _HASH.match(name):
             raise MemoryFileError(f"{name!r} is not the name of a stored picture")
         path = self._path(name)
+        if not path.exists():
+            raise MemoryFileError(f"picture {name} is not in {self.folder}")
         try:
-            with Image.open(path) as image:
-                rgb = np.asarray(image.convert("RGB"), dtype=np.uint8)
-        except FileNotFoundError as error:
-            raise MemoryFileError(f"picture {name} is not in {self.folder}") from error
-        except (OSError, SyntaxError, UnidentifiedImageError) as error:
+            rgb = np.asarray(read_picture(path, "RGB"), dtype=np.uint8)
+        except FileFormatError as error:
             raise MemoryFileError(f"picture {path} is damaged: {error}") from error
         if _hash(rgb) != name:
             raise MemoryFileError(f"picture {path} is damaged: its content is not what it says")

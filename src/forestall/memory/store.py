@@ -23,6 +23,8 @@ from types import TracebackType
 from forestall.errors import MemoryFileError
 from forestall.memory.codec import DamageError, Encoded, EncodedStep, decode, encode
 from forestall.memory.images import ImageFolder
+from forestall.memory.schema import RECORDINGS, SCHEMA, own_schemas, schema_of
+from forestall.reading.files import MOST_BYTES
 from forestall.types.demonstration import Demonstration
 from forestall.types.observation import Rgb
 
@@ -30,39 +32,6 @@ APPLICATION_ID = 0x464F5245
 """Marks the file as a memory of forestall ("FORE")."""
 
 SCHEMA_VERSION = 1
-
-_SCHEMA = """
-CREATE TABLE demonstrations (
-    id TEXT PRIMARY KEY,
-    task TEXT NOT NULL,
-    scene TEXT NOT NULL,
-    seed INTEGER NOT NULL,
-    version TEXT NOT NULL,
-    perception TEXT NOT NULL,
-    things BLOB NOT NULL,
-    digest TEXT NOT NULL,
-    recorded_at TEXT NOT NULL
-) STRICT;
-CREATE TABLE steps (
-    demonstration TEXT NOT NULL REFERENCES demonstrations(id) ON DELETE CASCADE,
-    position INTEGER NOT NULL,
-    number INTEGER NOT NULL,
-    subtask TEXT NOT NULL,
-    graph BLOB NOT NULL,
-    whole BLOB NOT NULL,
-    image TEXT,
-    PRIMARY KEY (demonstration, position)
-) STRICT, WITHOUT ROWID;
-CREATE INDEX demonstrations_by_task ON demonstrations(task);
-"""
-
-_RECORDINGS = """
-CREATE TABLE IF NOT EXISTS recordings (
-    job TEXT PRIMARY KEY,
-    demonstration TEXT NOT NULL REFERENCES demonstrations(id) ON DELETE CASCADE
-) STRICT
-"""
-"""What was recorded for what; made with the first, so that a memory without it is read as well."""
 
 _MAGIC = b"SQLite format 3\x00"
 
@@ -161,7 +130,7 @@ class SqliteStore:
             if old is None:
                 self._insert(name, digest, encoded)
             if job is not None:
-                self._connection.execute(_RECORDINGS)
+                self._connection.execute(RECORDINGS)
                 self._connection.execute(
                     "INSERT OR REPLACE INTO recordings VALUES (?, ?)", (job, name)
                 )
@@ -260,6 +229,8 @@ class SqliteStore:
             uri, uri=True, timeout=self._busy_timeout_s, isolation_level=None
         )
         connection.row_factory = sqlite3.Row
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
+        connection.execute("PRAGMA trusted_schema = OFF")
         connection.execute("PRAGMA foreign_keys = ON")
         return connection
 
@@ -280,6 +251,11 @@ class SqliteStore:
                 raise MemoryFileError(
                     f"memory {self.path} has schema version {version}, this version of forestall "
                     f"reads {SCHEMA_VERSION}: record it again with 'forestall demos record'"
+                )
+            least, most = own_schemas()
+            if not least <= self._schema() <= most:
+                raise MemoryFileError(
+                    f"memory {self.path} is damaged: its tables are not those of a memory"
                 )
             problem = self._connection.execute("PRAGMA quick_check(1)").fetchone()[0]
             if problem != "ok":
@@ -307,8 +283,11 @@ class SqliteStore:
     def _tables(self) -> int:
         return int(self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
 
+    def _schema(self) -> set[tuple[str, ...]]:
+        return schema_of(self._connection)
+
     def _make(self) -> None:
-        for statement in _SCHEMA.strip().removesuffix(";").split(";\n"):
+        for statement in SCHEMA.strip().removesuffix(";").split(";\n"):
             self._connection.execute(statement)
         self._connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         self._connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
@@ -354,6 +333,8 @@ class SqliteStore:
             yield
         except DamageError as error:
             raise MemoryFileError(f"memory {self.path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise MemoryFileError(f"memory {self.path} is damaged: {error}") from error
         except sqlite3.Error as error:
             text = str(error)
             if "lock" in text or "busy" in text:

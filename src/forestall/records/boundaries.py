@@ -6,11 +6,11 @@ Called by `codec.py` and by the recorder; calls `verdicts.py`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import PurePosixPath
 from typing import Any
 
+from forestall.reading.fields import Field
+from forestall.reading.files import is_inside
 from forestall.records.derived import Mark
-from forestall.records.fields import Field
 from forestall.records.verdicts import (
     diagnosis_from,
     diagnosis_json,
@@ -179,8 +179,7 @@ def _frame(field: Field) -> StoredFrame:
 
 
 def _inside_the_folder(field: Field) -> str:
-    path = PurePosixPath(field.text())
-    if path.is_absolute() or ".." in path.parts or "\\" in field.text() or "\0" in field.text():
+    if not is_inside(field.text()):
         field.fail("a path inside the folder of the record")
     return field.text()
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from forestall.domain.load import shipped, shipped_names
 from forestall.errors import FileFormatError, InputError
+from forestall.reading.fields import Field
 from forestall.records.boundaries import (
     boundary_from,
     boundary_json,
@@ -29,7 +30,6 @@ from forestall.records.derived import (
     reasoning_s,
     replans,
 )
-from forestall.records.fields import Field
 from forestall.records.plain import plain
 from forestall.records.verdicts import graph, literal, plan
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, Trouble, TroubleKind

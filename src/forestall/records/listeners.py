@@ -11,9 +11,9 @@ from types import TracebackType
 
 from rich.console import Console
 from rich.live import Live
-from rich.markup import escape
 from rich.text import Text
 
+from forestall.reading.printing import shown
 from forestall.records.derived import in_words
 from forestall.types.decision import Outcome
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
@@ -141,18 +141,18 @@ class ProgressLine:
             ahead = max(0, self._total - self._done)
             left = f", about {elapsed / self._done * ahead:.0f} s left"
         return Text.from_markup(
-            f"[bold]{escape(self._task)}[/] "
+            f"[bold]{shown(self._task)}[/] "
             f"{min(self._done + 1, max(1, self._total))}/{max(1, self._total)} "
-            f"[cyan]{escape(self._now)}[/] · {self._simulated_s:.0f} s simulated · "
+            f"[cyan]{shown(self._now)}[/] · {self._simulated_s:.0f} s simulated · "
             f"{self._count()} · {elapsed:.0f} s elapsed{left}",
             overflow="ellipsis",
         )
 
     def _say(self, text: str, style: str = "") -> None:
         if self._console.is_terminal:
-            self._console.print(escape(text), style=style)
+            self._console.print(shown(text), style=style)
         else:
-            self._console.print(escape(text), soft_wrap=True)
+            self._console.print(shown(text), soft_wrap=True)
 
     def _refresh(self) -> None:
         if self._live is not None:

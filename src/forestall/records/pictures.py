@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from forestall.errors import FileFormatError
+from forestall.reading.files import inside
+from forestall.reading.pictures import read_picture
 from forestall.types.episode import StoredFrame
 from forestall.types.observation import Frame, Rgb
 
@@ -55,22 +56,13 @@ def rgb_of(frame: Frame | StoredFrame, folder: Path | None) -> Rgb | None:
         folder: of the record.
 
     Raises:
-        FileFormatError: the file is not a picture.
+        FileFormatError: the file is not a picture, or not in the folder.
     """
-    from PIL import Image
-
     if isinstance(frame, Frame):
         return frame.rgb
-    if frame.picture is None or folder is None:
+    if frame.picture is None or folder is None or not (folder / frame.picture).is_file():
         return None
-    path = folder / frame.picture
-    if not path.is_file():
-        return None
-    try:
-        with Image.open(path) as image:
-            return np.asarray(image.convert("RGB"))
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise FileFormatError(f"{path} is not a picture: {error}") from error
+    return np.asarray(read_picture(inside(folder, frame.picture), "RGB"))
 
 
 def page_picture(rgb: Rgb, *, width: int, budget_bytes: int) -> Picture:

@@ -16,6 +16,9 @@ from typing import Any
 
 from forestall.errors import FileFormatError, InputError
 from forestall.files import naming, replace_file
+from forestall.reading.documents import parse_json
+from forestall.reading.fields import Field
+from forestall.reading.files import read_text
 from forestall.records.boundaries import boundary_json, by_reference, executed_json
 from forestall.records.codec import (
     KIND,
@@ -27,7 +30,6 @@ from forestall.records.codec import (
     record_to_json,
 )
 from forestall.records.derived import alarm_at, new_plan
-from forestall.records.fields import Field, load_json
 from forestall.records.pictures import encode_jpeg, file_name
 from forestall.records.plain import plain
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord
@@ -37,6 +39,9 @@ from forestall.types.runtime import BoundaryContext, When
 RECORD_NAME = "record.json"
 LINES_NAME = "boundaries.jsonl"
 IMAGES_NAME = "images"
+
+MOST_RECORD_BYTES = 2**28
+"""How large a record may be: about a thousand boundaries."""
 
 
 class RunRecorder:
@@ -156,19 +161,14 @@ def read_record(path: Path | str) -> EpisodeRecord:
     if path.is_dir():
         whole, lines = path / RECORD_NAME, path / LINES_NAME
         path = whole if whole.exists() or not lines.exists() else lines
-    try:
-        torn = "replace" if path.suffix == ".jsonl" else "strict"  # a kill may split a character
-        text = path.read_text(encoding="utf-8", errors=torn)
-    except OSError as error:
-        raise FileFormatError(f"no record of a run at {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise FileFormatError(f"{path} is not the record of a run: it is not text") from error
+    torn = "replace" if path.suffix == ".jsonl" else "strict"  # a kill may split a character
+    text = read_text(path, "record of a run", MOST_RECORD_BYTES, torn)
     if not text.strip():
         raise FileFormatError(f"{path} is empty: not the record of a run")
     try:
         if path.suffix == ".jsonl":
             return _read_lines(text)
-        return record_from_json(load_json(text))
+        return record_from_json(parse_json(text))
     except FileFormatError as error:
         raise FileFormatError(f"{path}: {error}") from error
 
@@ -212,7 +212,7 @@ def _read_lines(text: str) -> EpisodeRecord:
         if not row:
             continue
         try:
-            events.append(Field(load_json(row), f"line {number}"))
+            events.append(Field(parse_json(row), f"line {number}"))
         except FileFormatError as error:
             if number == len(rows):  # the line that was being written when the run was killed
                 break

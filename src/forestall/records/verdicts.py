@@ -9,7 +9,7 @@ import base64
 import math
 from typing import Any
 
-from forestall.records.fields import Field
+from forestall.reading.fields import Field
 from forestall.types.demonstration import View
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
@@ -163,7 +163,7 @@ def _reference_from(field: Field) -> Reference:
         similarity=field["similarity"].number(),
         graph=graph(field["graph"]),
         later=field["later"].tuple_of(subtask),
-        view=field.maybe("view", _view_from),
+        view=field.maybe("view", view_from),
         after=field.maybe("after", graph),
     )
 
@@ -178,7 +178,8 @@ def _view_json(view: View) -> dict[str, Any]:
     }
 
 
-def _view_from(field: Field) -> View:
+def view_from(field: Field) -> View:
+    """What a picture comes down to."""
     return View(
         image=field.maybe("image", _bytes),
         caption=field["caption"].text(),

@@ -6,10 +6,15 @@ Written by the experiments, read by metrics, tables, figures and pages. Truth ab
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from functools import cache
+from typing import Any, ClassVar
+
+from pydantic import ConfigDict, TypeAdapter
 
 from forestall.errors import FileFormatError
+from forestall.reading.models import validated_json
 from forestall.statistics.cases import Case
 
 ROW_FORMAT = 1
@@ -22,6 +27,9 @@ def row_key(case: Case, strategy: str, detector: str, threshold: float, without:
     if strategy not in ("none", "watch"):
         parts += [detector, f"{threshold:.2f}"]
     return "_".join([*parts, *([f"without-{without}"] if without else [])])
+
+
+_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +51,8 @@ class Judged:
         possible: truth: the next subtask could be carried out now.
         reachable: truth: what is left of the plan would reach the goal from here.
     """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
     index: int
     when: str
@@ -96,6 +106,8 @@ class EpisodeRow:
             shows, so that the run is that one.
         provenance: configuration, versions, demonstrations.
     """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
     set: str
     task: str
@@ -151,19 +163,18 @@ class EpisodeRow:
         return {"format": ROW_FORMAT, **asdict(self)}
 
     @classmethod
-    def from_json(cls, data: dict[str, Any]) -> EpisodeRow:
+    def from_json(cls, data: Any) -> EpisodeRow:
         """Read what `to_json` wrote.
 
         Raises:
             FileFormatError: another format, or fields that do not fit.
         """
-        fields = dict(data)
+        fields = dict(data) if isinstance(data, dict) else {}
         if (found := fields.pop("format", None)) != ROW_FORMAT:
             raise FileFormatError(f"a result of format {found}; this version reads {ROW_FORMAT}")
-        try:
-            judged = tuple(Judged(**j) for j in fields.pop("judged"))
-            for name in ("failures", "harmed"):
-                fields[name] = tuple(fields[name])
-            return cls(judged=judged, **fields)
-        except (TypeError, KeyError) as error:
-            raise FileFormatError(f"not a result of this version: {error}") from error
+        return validated_json(_row(), json.dumps(fields))
+
+
+@cache
+def _row() -> TypeAdapter[EpisodeRow]:
+    return TypeAdapter(EpisodeRow)

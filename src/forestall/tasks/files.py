@@ -8,7 +8,6 @@ are checked against the domain when loaded.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -16,13 +15,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter
 
 from forestall.config import DEFAULT_DOMAIN
 from forestall.domain.checks import check_literal
 from forestall.domain.load import extend, load_domain, shipped_names
 from forestall.domain.model import Domain
-from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.errors import InputError, UnknownNameError
+from forestall.reading.documents import MOST_TOML_BYTES, parse_toml
+from forestall.reading.files import read_text
+from forestall.reading.models import validated
 from forestall.tasks.faults import Fault
 from forestall.tasks.schemas import (
     GoalFile,
@@ -231,10 +233,7 @@ def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str, str]:
     """Source, text and domain of a file; one of the user's own says its domain itself."""
     if _is_file(name_or_file):
         path = Path(name_or_file)
-        try:
-            return str(path), path.read_text(encoding="utf-8"), DEFAULT_DOMAIN
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileFormatError(f"cannot read {kind} file {path}: {error}") from error
+        return str(path), read_text(path, f"{kind} file", MOST_TOML_BYTES), DEFAULT_DOMAIN
     shipped = {name: (text, domain) for name, text, domain in _shipped(folder)}
     if name_or_file not in shipped:
         raise UnknownNameError(kind, name_or_file, shipped)
@@ -242,15 +241,7 @@ def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str, str]:
 
 
 def _validated(model: type[M], source: str, text: str) -> M:
-    try:
-        return model.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(f"{source}: not valid TOML: {error}") from error
-    except ValidationError as error:
-        problems = "; ".join(
-            f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:4]
-        )
-        raise FileFormatError(f"{source}: {problems}") from error
+    return validated(model, parse_toml(text, source), source)
 
 
 def _task(source: str, data: TaskFile, read_in: Callable[[], Domain]) -> LoadedTask:

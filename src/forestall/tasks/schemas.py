@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from forestall.tasks.faults import Fault
+
+Clutter = Annotated[int, Field(strict=True, ge=0, le=100)]
+"""How many things that have nothing to do with the task; a room does not hold a hundred."""
 
 _NAME = r"^[a-z0-9]+(-[a-z0-9]+)*$"
 
@@ -39,7 +42,7 @@ class SceneFile(_Model):
     """The scene table."""
 
     room: str = ""
-    clutter: tuple[int, int] = (2, 6)
+    clutter: tuple[Clutter, Clutter] = (2, 6)
     objects: list[ObjectFile] = Field(default_factory=list)
     fixtures: dict[str, dict[str, str]] = Field(default_factory=dict)
 

@@ -14,7 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from forestall.domain.model import Domain
-from forestall.embeddings.twotower import DESCRIPTION_NAME, Description, TwoTowerEncoder
+from forestall.embeddings.twotower import (
+    DESCRIPTION_NAME,
+    Description,
+    TwoTowerEncoder,
+    checksums,
+)
 from forestall.errors import InputError
 from forestall.files import replace_file
 from forestall.training import shards
@@ -122,7 +127,7 @@ def calibrate(
 
 
 def write(out: Path, description: Description) -> None:
-    """Write encoder.json, whole or not at all."""
-    out.mkdir(parents=True, exist_ok=True)
+    """Write encoder.json beside the towers that it describes, whole or not at all."""
+    description = replace(description, sha256=checksums(out))
     text = json.dumps(description.as_json(), indent=1) + "\n"
     replace_file(out / DESCRIPTION_NAME, text.encode())

@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +28,9 @@ from forestall.errors import FileFormatError, ForestallError, InputError, Unknow
 from forestall.files import alone, make_folder, replace_file, whole_file
 from forestall.perception.segmenters import InstanceSegmenter
 from forestall.processes import pool
+from forestall.reading.arrays import NUMBERS, read_npz
+from forestall.reading.documents import read_json
+from forestall.reading.fields import Field
 from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, Picture, SceneConfig
 
@@ -187,9 +189,9 @@ def read(folder: Path, split: str) -> Crops:
     frames = 0
     for path in paths:
         try:
-            with path.open("rb") as file, np.load(file) as data:
-                shard = Crops(**{name: data[name] for name in Crops.__dataclass_fields__})
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+            data = read_npz(path, NUMBERS + "U")
+            shard = Crops(**{name: data[name] for name in Crops.__dataclass_fields__})
+        except (FileFormatError, ValueError, KeyError) as error:
             raise FileFormatError(f"{path} cannot be read ({error}): remove it") from error
         shard.frame[:] += frames
         frames = int(shard.frame[-1]) + 1
@@ -253,11 +255,7 @@ def options(folder: Path) -> dict[str, Any]:
         FileFormatError: the file that says so is missing or damaged.
     """
     path = folder / OPTIONS_NAME
-    try:
-        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"{path} cannot be read ({error})") from error
-    return data
+    return dict(Field(read_json(path, "list of options")).pairs(lambda f: f.value))
 
 
 def _same_options(out: Path, config: PictureConfig) -> None:

@@ -7,7 +7,6 @@ that only their meaning brings near.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -18,6 +17,7 @@ import numpy as np
 from forestall.domain.model import Domain
 from forestall.domain.phrases import with_articles
 from forestall.errors import FileFormatError
+from forestall.reading.documents import read_toml
 from forestall.seams import TextEncoder
 
 GROUPS = ("spelling", "meaning")
@@ -68,10 +68,7 @@ def word_list(path: Path | None = None) -> tuple[Word, ...]:
         FileFormatError: it is no table of words for each group.
     """
     path = path or Path(str(files("forestall").joinpath("data/encoder_words.toml")))
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FileFormatError(f"{path} cannot be read as TOML: {error}") from error
+    data = read_toml(path, "list of words")
     if set(data) - set(GROUPS) or not all(isinstance(t, dict) for t in data.values()):
         raise FileFormatError(
             f'{path} must hold tables [{"], [".join(GROUPS)}] of lines such as wok = "Pan"'

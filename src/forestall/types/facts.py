@@ -28,7 +28,7 @@ class Truth(Enum):
     UNOBSERVED = "unobserved"
 
 
-_TEXT = re.compile(r"^\s*(not\s+)?([a-z_][a-z0-9_]*)\s*\(([^()]*)\)\s*(?:=\s*([A-Za-z_]\w*))?\s*$")
+_TEXT = re.compile(r"(not\s+)?([a-z_][a-z0-9_]*)\s*\(([^()]*)\)(?:\s*=\s*([A-Za-z_]\w*))?")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -59,7 +59,7 @@ class Literal:
         Raises:
             InputError: the text is not `predicate(a, b)`, `not predicate(a)` or `attribute(a)=v`.
         """
-        match = _TEXT.match(text)
+        match = _TEXT.fullmatch(text.strip())
         if match is None or (match[1] and match[4]):
             raise InputError(
                 f"cannot read {text!r} as a fact: write attribute(Thing)=value, "
@@ -78,7 +78,7 @@ class Literal:
 def category_of(name: str) -> str:
     """The category part of an instance name: "Tray-4" → "Tray"."""
     head, _, tail = name.rpartition("-")
-    return head if head and tail.isdigit() else name
+    return head if head and tail.isdecimal() else name
 
 
 def is_instance(name: str) -> bool:

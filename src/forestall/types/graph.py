@@ -7,12 +7,14 @@ equal graphs have equal text, JSON and hashes.
 from __future__ import annotations
 
 import base64
-from collections.abc import Collection, Iterable
+from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from forestall.errors import FileFormatError, InputError
+from forestall.reading.fields import Field
 from forestall.types.facts import GRIPPER
 from forestall.types.observation import Vec3
 from forestall.types.plan import Subtask
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
     import networkx as nx
 
 GRAPH_FORMAT = 1
+
+MOST_NODES = 2000
+MOST_RELATIONS = 20_000
+"""How much a graph that is read may hold: a room has a hundred things, and matching is cubic."""
 
 
 class Seen(Enum):
@@ -39,7 +45,7 @@ class Box:
     high: Vec3
 
     def __post_init__(self) -> None:
-        if any(a > b for a, b in zip(self.low, self.high, strict=True)):
+        if not all(a <= b for a, b in zip(self.low, self.high, strict=True)):  # NaN is no order
             raise InputError(f"box corners are out of order: {self.low} > {self.high}")
 
     @property
@@ -131,7 +137,7 @@ class SceneGraph:
         object.__setattr__(self, "hidden", tuple(sorted(set(self.hidden))))
         ids = {n.id for n in self.nodes}
         if len(ids) != len(self.nodes):
-            twice = sorted({n.id for n in self.nodes if [m.id for m in self.nodes].count(n.id) > 1})
+            twice = sorted(i for i, n in Counter(n.id for n in self.nodes).items() if n > 1)
             raise InputError(f"node ids must be unique; twice: {', '.join(twice)}")
         for r in self.relations:
             for end in (r.subject, r.object):
@@ -209,20 +215,21 @@ class SceneGraph:
             FileFormatError: not a scene graph, another format version, or a broken field.
             InputError: a dangling relation, or an id twice.
         """
+        field = Field(data)
         if not isinstance(data, dict) or "nodes" not in data:
             raise FileFormatError("not a scene graph: an object with 'nodes' is expected")
         if data.get("format") != GRAPH_FORMAT:
             raise FileFormatError(
                 f"scene graph format {data.get('format')!r}: this version reads {GRAPH_FORMAT}"
             )
-        try:
-            nodes = tuple(_node(n) for n in data["nodes"])
-            relations = tuple(Relation(*map(str, r)) for r in data.get("relations", ()))
-            subtask = Subtask.parse(data["subtask"]) if data.get("subtask") else None
-            hidden = tuple(map(str, data.get("hidden", ())))
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(f"broken scene graph: {error!r}") from error
-        return cls(nodes, relations, subtask, hidden)
+        nodes = field["nodes"].at_most(MOST_NODES, node_from)
+        relations = field.optional("relations", lambda f: f.at_most(MOST_RELATIONS, relation_from))
+        return cls(
+            nodes=nodes,
+            relations=relations or (),
+            subtask=field.optional("subtask", lambda f: f.parsed(Subtask.parse)),
+            hidden=field.optional("hidden", lambda f: f.tuple_of(Field.name)) or (),
+        )
 
     def to_networkx(self) -> nx.MultiDiGraph:
         """The same graph for networkx; attributes as in the JSON form."""
@@ -234,13 +241,6 @@ class SceneGraph:
         for r in self.relations:
             graph.add_edge(r.subject, r.object, key=r.predicate, predicate=r.predicate)
         return graph
-
-
-def _vec(values: Iterable[float] | None) -> Vec3 | None:
-    if values is None:
-        return None
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
 
 
 def _node_json(node: ObjectNode, features: bool) -> dict[str, Any]:
@@ -259,20 +259,45 @@ def _node_json(node: ObjectNode, features: bool) -> dict[str, Any]:
     return data
 
 
-def _node(data: dict[str, Any]) -> ObjectNode:
-    box = data.get("box_m")
-    feature = data.get("feature")
-    low, high = (_vec(box[0]), _vec(box[1])) if box is not None else (None, None)
+def node_from(field: Field) -> ObjectNode:
+    """An object of a graph as `SceneGraph.to_json` wrote it.
+
+    Raises:
+        FileFormatError: a value that cannot be, with its place.
+    """
+    pixels, seen_s = field.optional("pixels", Field.whole), field.find("last_seen_s")
     return ObjectNode(
-        id=str(data["id"]),
-        category=str(data["category"]),
-        states=tuple(
-            (str(k), None if v is None else str(v)) for k, v in data.get("states", {}).items()
-        ),
-        centroid_m=_vec(data.get("centroid_m")),
-        box_m=None if low is None or high is None else Box(low, high),
-        seen=Seen(data.get("seen", "visible")),
-        pixels=int(data.get("pixels", 0)),
-        last_seen_s=float(data.get("last_seen_s", 0.0)),
-        feature=None if feature is None else base64.b64decode(feature, validate=True),
+        id=field["id"].name(),
+        category=field["category"].name(),
+        states=field.optional("states", lambda f: f.pairs(_value)) or (),
+        centroid_m=field.optional("centroid_m", Field.vector),
+        box_m=field.optional("box_m", _box),
+        seen=field.optional("seen", lambda f: f.member(Seen)) or Seen.VISIBLE,
+        pixels=pixels or 0,
+        last_seen_s=0.0 if seen_s is None else seen_s.number(),
+        feature=field.optional("feature", _feature),
     )
+
+
+def _value(field: Field) -> str | None:
+    return None if field.value is None else field.name()
+
+
+def _box(field: Field) -> Box:
+    corners = field.tuple_of(Field.vector)
+    if len(corners) != 2:
+        field.fail("two corners, the low one and the high one,")
+    return field.parsed(lambda _: Box(*corners))
+
+
+def _feature(field: Field) -> bytes:
+    field.text()
+    feature: bytes = field.parsed(lambda text: base64.b64decode(text, validate=True))
+    if not any(feature):
+        field.fail("base64 of bytes that are not all zero")
+    return feature
+
+
+def relation_from(field: Field) -> Relation:
+    """A relation: [subject, predicate, object]."""
+    return Relation(*field.triple())

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from forestall.errors import InputError
 from forestall.types.facts import category_of
 
-_TEXT = re.compile(r"^\s*\(?\s*([a-z][a-z0-9_]*)\s*[(,]\s*([^()]*?)\s*\)\s*$")
+_TEXT = re.compile(r"\(?\s*([a-z][a-z0-9_]*)\s*[(,]([^()]*)\)")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -29,7 +29,7 @@ class Subtask:
         Raises:
             InputError: the text is no subtask.
         """
-        match = _TEXT.match(text)
+        match = _TEXT.fullmatch(text.strip()) if isinstance(text, str) else None
         if match is None:
             raise InputError(f"cannot read {text!r} as a subtask: write skill(Thing, Place)")
         return cls(match[1], tuple(a.strip() for a in match[2].split(",") if a.strip()))

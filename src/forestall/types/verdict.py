@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from numbers import Real
 
+from forestall.errors import InputError
 from forestall.types.demonstration import View
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
@@ -106,7 +109,12 @@ class Violation:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A detector's answer at one boundary."""
+    """A detector's answer at one boundary.
+
+    Raises:
+        InputError: a decision that is none, a score that is no number: what a plug-in answers is
+            not believed before it was looked at.
+    """
 
     decision: Decision
     detector: str
@@ -120,10 +128,24 @@ class Verdict:
     references: int = 0  # demonstrations that there was something to compare with of
     note: str = ""
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.decision, Decision):
+            raise InputError(
+                f"a verdict decides {' or '.join(d.value for d in Decision)}, not {self.decision!r}"
+            )
+        _check_number("threshold", self.threshold)
+        if self.score is not None:
+            _check_number("score", self.score)
+
     @property
     def judged(self) -> bool:
         """Whether anything was compared or checked; without a reference nothing is."""
         return self.score is not None or self.calibration is not Calibration.UNCALIBRATED
+
+
+def _check_number(what: str, number: object) -> None:
+    if not isinstance(number, Real) or math.isnan(number):
+        raise InputError(f"the {what} of a verdict is a number, not {number!r}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,10 @@ SHAPES = (
 )
 """Shapes that the household can build from a size."""
 
+_ANY_SIZE_M = [0.08, 0.08, 0.08]
+_LARGEST_M = 3.0
+"""No thing that a task file brings is larger: a room has three to six metres."""
+
 
 @dataclass(frozen=True, slots=True)
 class Receptacle:
@@ -289,6 +293,7 @@ def _added(domain: Domain, described: Described) -> Category:
         raise InputError(f"category {name}: world.shape must be a table")
     if described.size_m:
         shape = {**shape, "size_m": list(described.size_m)}
+    _check_size(name, shape.get("size_m", _ANY_SIZE_M))
 
     def related(predicate: str) -> tuple[str, ...]:
         facts = domain.statics.get(predicate, frozenset())
@@ -319,6 +324,15 @@ def _added(domain: Domain, described: Described) -> Category:
         aliases=described.aliases,
         words=described.words,
     )
+
+
+def _check_size(name: str, size_m: Any) -> None:
+    edges = size_m if isinstance(size_m, list) else []
+    if len(edges) != 3 or not all(type(e) in (int, float) and 0 < e <= _LARGEST_M for e in edges):
+        raise InputError(
+            f"category {name}: size_m is width, depth and height in metres, each at most "
+            f"{_LARGEST_M:g}, got {size_m!r:.60}"
+        )
 
 
 def _device(tags: frozenset[str], related: Callable[[str], tuple[str, ...]]) -> Device | None:

@@ -63,7 +63,7 @@ class Boxes(Protocol):
 def number_of(name: str) -> int:
     """The instance number of a name, 0 without one."""
     tail = name.rpartition("-")[2]
-    return int(tail) if tail.isdigit() else 0
+    return int(tail) if tail.isdecimal() else 0
 
 
 def natural_key(name: str) -> tuple[str, int, str]:

@@ -1,26 +1,28 @@
-"""Reading JSON that may be anything: every value knows its place, every error names it.
+"""Values that may be anything: each knows its place, every error names it.
 
-Used by the codec; calls nothing. What is wrong is a `FileFormatError` such as
-"boundaries[3].verdict.score: a number is expected, got 'high'".
+Used by the readers of graphs, records and memories; calls nothing. What is wrong is a
+`FileFormatError` such as "boundaries[3].verdict.score: a number is expected, got 'high'".
 """
 
 from __future__ import annotations
 
-import json
-import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 from typing import Any, NoReturn, TypeVar
 
 from forestall.errors import FileFormatError, ForestallError
-from forestall.types.observation import Vec3
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
 
-MAX_DEPTH = 64
-"""How deep lists and objects of a record may nest; ours are at most twelve deep."""
+_THREE = [float] * 3
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+
+MOST_NAME = 256
+"""How many characters a name may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +61,26 @@ class Field:
         field = self[key]
         return None if field.value is None else read(field)
 
+    def optional(self, key: str, read: Callable[[Field], T]) -> T | None:
+        """What is under a key, None where that is null or not there."""
+        field = self.find(key)
+        return None if field is None or field.value is None else read(field)
+
     def items(self) -> list[Field]:
         """The elements of a list."""
-        if not isinstance(self.value, list):
+        if not isinstance(self.value, list | tuple):
             self.fail("a list")
         return [Field(v, f"{self.place}[{i}]") for i, v in enumerate(self.value)]
 
     def tuple_of(self, read: Callable[[Field], T]) -> tuple[T, ...]:
         """Every element of a list, read."""
         return tuple(read(f) for f in self.items())
+
+    def at_most(self, most: int, read: Callable[[Field], T]) -> tuple[T, ...]:
+        """Every element of a list that may have so many."""
+        if isinstance(self.value, list | tuple) and len(self.value) > most:
+            raise FileFormatError(f"{self._name()}: at most {most} are read, got {len(self.value)}")
+        return self.tuple_of(read)
 
     def pairs(self, read: Callable[[Field], T]) -> tuple[tuple[str, T], ...]:
         """Every entry of an object, in order."""
@@ -79,6 +92,14 @@ class Field:
         """A text."""
         if not isinstance(self.value, str):
             self.fail("a text")
+        return self.value
+
+    def name(self) -> str:
+        """A text that names something; a whole number is taken as its digits."""
+        if isinstance(self.value, int) and not isinstance(self.value, bool):
+            return str(self.value)
+        if not isinstance(self.value, str) or not _shows(self.value):
+            self.fail(f"a name of 1 to {MOST_NAME} characters that can be shown")
         return self.value
 
     def flag(self) -> bool:
@@ -101,16 +122,26 @@ class Field:
             number = float(self.value)
         except OverflowError:
             self.fail("a number")
-        if not math.isfinite(number):
+        if not isfinite(number):
             self.fail("a finite number")
         return number
 
-    def vector(self) -> Vec3:
+    def vector(self) -> tuple[float, float, float]:
         """Three numbers."""
+        value = self.value
+        if type(value) is list and [type(v) for v in value] == _THREE and isfinite(sum(value)):
+            return (value[0], value[1], value[2])  # the same, faster: memories have thousands
         numbers = self.tuple_of(Field.number)
         if len(numbers) != 3:
             self.fail("three numbers")
         return (numbers[0], numbers[1], numbers[2])
+
+    def triple(self) -> tuple[str, str, str]:
+        """Three names, as a relation has them."""
+        names = self.tuple_of(Field.name)
+        if len(names) != 3:
+            self.fail("subject, predicate and object")
+        return (names[0], names[1], names[2])
 
     def member(self, kind: type[E]) -> E:
         """A member of an enumeration, by its value."""
@@ -129,51 +160,10 @@ class Field:
             raise FileFormatError(f"{self._name()} cannot be read: {error}") from error
 
     def _name(self) -> str:
-        return self.place or "the record"
+        return self.place or "the document"
 
 
-def load_json(text: str) -> Any:
-    """Parse a JSON document of finite depth, numbers and characters that can be written again.
-
-    Raises:
-        FileFormatError: it is none.
-    """
-    try:
-        data = json.loads(text, parse_constant=_no_constant)
-    except json.JSONDecodeError as error:
-        raise FileFormatError(f"damaged or truncated (line {error.lineno}): {error.msg}") from error
-    except RecursionError as error:
-        raise FileFormatError("damaged: it nests too deeply") from error
-    except ValueError as error:
-        raise FileFormatError(f"damaged: {error}") from error
-    if "\\u" in text:
-        _check_characters(data)
-    _check_depth(data)
-    return data
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number in JSON")
-
-
-def _check_characters(data: Any) -> None:
-    try:
-        json.dumps(data, ensure_ascii=False).encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise FileFormatError("damaged: it has half of a character") from error
-    except RecursionError as error:
-        raise FileFormatError("damaged: it nests too deeply") from error
-
-
-def _check_depth(data: Any) -> None:
-    level = [data]
-    for _ in range(MAX_DEPTH):
-        level = [
-            inner
-            for value in level
-            if isinstance(value, dict | list)
-            for inner in (value.values() if isinstance(value, dict) else value)
-        ]
-        if not level:
-            return
-    raise FileFormatError(f"damaged: it nests more than {MAX_DEPTH} deep")
+def _shows(name: str) -> bool:
+    if not 0 < len(name) <= MOST_NAME:
+        return False
+    return name.isprintable() or _CONTROL.search(name) is None

@@ -1,0 +1,55 @@
+"""The commands of `forestall`, put together; called by `main.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cyclopts
+from cyclopts import App
+
+import forestall
+from forestall.cli import experiments
+from forestall.cli.bench import bench
+from forestall.cli.demos import demos
+from forestall.cli.doctor import doctor
+from forestall.cli.domain import domain
+from forestall.cli.encoder import encoder
+from forestall.cli.flags import spelt
+from forestall.cli.inspect import check, compare
+from forestall.cli.listing import scenarios, tasks
+from forestall.cli.page import page
+from forestall.cli.parts import parts
+from forestall.cli.run import run
+from forestall.errors import InputError
+
+app = App(
+    name="forestall",
+    help="See a failing subtask coming, explain it, replan, succeed.",
+    version=forestall.__version__,
+    suppress_keyboard_interrupt=False,
+)
+for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
+    app.command(command)
+app.command(demos)
+app.command(domain)
+app.command(bench)
+experiments.register(bench)
+app.command(encoder)
+
+
+def answer(arguments: Sequence[str]) -> int:
+    """Run one command line and return what the command answers.
+
+    Raises:
+        InputError: the command line is not valid.
+    """
+    try:
+        code = app(
+            list(spelt(arguments)),
+            exit_on_error=False,
+            print_error=False,
+            result_action="return_value",
+        )
+    except cyclopts.CycloptsError as error:
+        raise InputError(str(error)) from error
+    return code if isinstance(code, int) else 0

@@ -1,0 +1,99 @@
+"""What the files of a folder of results may say, as pydantic checks it.
+
+Called by `folder`; calls `reading`. What is found there may have been cut off, edited or made by
+another version; what does not fit is one sentence with file, line and key.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from forestall.errors import FileFormatError
+from forestall.reading.documents import parse_json
+from forestall.reading.files import read_text
+
+MOST_ROWS_BYTES = 2**30
+"""How large the file of rows may be: about 200,000 episodes."""
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
+
+
+class _Part(_Model):
+    name: str
+    given: dict[str, Any]
+    defaulted: dict[str, Any]
+
+
+class _Settings(_Model):
+    parts: dict[str, _Part]
+
+
+class AnyAbout(_Model):
+    """experiment.json of any kind of results."""
+
+    kind: str
+    version: str
+    sources: str
+    settings: _Settings | None = None
+
+
+class ExperimentAbout(AnyAbout):
+    """experiment.json of the paper's experiments."""
+
+    split: str
+    rounds: int
+    settings: _Settings
+
+
+class Chosen(_Model):
+    """Which episodes a call wanted: the fields of `runs.Choice`."""
+
+    experiment: str
+    split: str
+    rounds: int
+    limit: int | None
+    sets: list[str]
+    strategies: list[str]
+
+
+class Call(_Model):
+    """One line of effort.jsonl: what a call of the command did, and where."""
+
+    jobs: int
+    engine: str
+    machine: str
+    python: str
+    date: str
+    episodes: int = Field(ge=0)
+    seconds: float = Field(ge=0)
+
+
+class ExperimentCall(Call):
+    """The same of one of the paper's experiments."""
+
+    choice: Chosen
+
+
+def lines_of(file: Path) -> tuple[list[tuple[str, Any]], str, str]:
+    """The lines of a file with one JSON value a line, each with its place.
+
+    Returns:
+        (place, value) of every whole line; their text; half a last line, which a kill may leave.
+
+    Raises:
+        FileFormatError: the file cannot be read, or a whole line is no JSON.
+    """
+    whole, newline, half = read_text(file, "list of results", MOST_ROWS_BYTES).rpartition("\n")
+    found = []
+    for number, line in enumerate((whole + newline).split("\n")[:-1], 1):
+        place = f"{file}, line {number}"
+        try:
+            found.append((place, parse_json(line)))
+        except FileFormatError as error:
+            raise FileFormatError(f"{place}: {error}") from error
+    return found, whole + newline, half

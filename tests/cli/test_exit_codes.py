@@ -1,0 +1,137 @@
+"""Exit codes: a crash never looks like an answer, and what is printed steers no terminal."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from forestall.cli import app, main
+from forestall.cli.main import call
+from forestall.errors import (
+    DomainError,
+    FileFormatError,
+    InputError,
+    MemoryFileError,
+    ModelFileError,
+    PerceptionError,
+    SceneError,
+    UnknownNameError,
+)
+
+
+def failing(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    def raise_it(arguments: object) -> int:
+        raise error
+
+    monkeypatch.setattr(app, "answer", raise_it)
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (InputError("x"), 2),
+        (UnknownNameError("task", "x", ["y"]), 2),
+        (FileFormatError("x"), 2),
+        (DomainError("x"), 2),
+        (PerceptionError("x"), 2),
+        (MemoryFileError("x"), 3),
+        (ModelFileError("x"), 3),
+        (SceneError("x"), 3),
+        (OSError(28, "No space left on device"), 3),
+        (ZeroDivisionError("division by zero"), 70),
+        (MemoryError(), 70),
+        (RecursionError("maximum recursion depth exceeded"), 70),
+        (SystemExit(1), 70),
+        (AssertionError(), 70),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_every_error_has_its_code_and_one_line(
+    error: BaseException,
+    code: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    failing(monkeypatch, error)
+    assert call(["tasks"]) == code
+    printed = capsys.readouterr()
+    assert printed.err.startswith("forestall: error: ") and printed.err.count("\n") == 1
+    assert printed.out == ""
+
+
+def test_an_internal_error_says_where_and_how_to_report_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv(main.VARIABLE, raising=False)
+    failing(monkeypatch, ZeroDivisionError("division by zero"))
+    assert call(["tasks"]) == 70
+    told = capsys.readouterr().err
+    assert "internal error: ZeroDivisionError: division by zero (test_exit_codes.py, line" in told
+    assert "report" in told and "--debug" in told and "Traceback" not in told
+    assert "**Reporting a fault.**" in Path("README.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("how", ["flag", "variable"])
+def test_debug_shows_the_traceback(
+    how: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if how == "variable":
+        monkeypatch.setenv(main.VARIABLE, "1")
+    failing(monkeypatch, ZeroDivisionError("division by zero"))
+    assert call(["tasks", "--debug"] if how == "flag" else ["tasks"]) == 70
+    assert "Traceback (most recent call last)" in capsys.readouterr().err
+
+
+def test_a_package_that_cannot_be_imported_is_no_alarm(tmp_path: Path) -> None:
+    """Python itself would end with 1, which means an alarm."""
+    (tmp_path / "cyclopts.py").write_text("raise RuntimeError('damaged')")
+    done = subprocess.run(
+        [sys.executable, "-m", "forestall", "tasks"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={
+            **os.environ,
+            "PYTHONPATH": f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+        },
+    )
+    assert done.returncode == 70, done.stderr
+    assert "internal error: RuntimeError: damaged" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments", [["rnu"], ["tasks", "--sed", "1"], ["compare"], ["check", "x", "--threshold", "a"]]
+)
+def test_a_wrong_command_line_is_invalid_input(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(arguments) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_names_in_files_steer_no_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, two = tmp_path / "one.json", tmp_path / "two.json"
+
+    def write(file: Path, name: str) -> None:
+        nodes = [{"id": name, "category": name}, {"id": "Table-1", "category": "Table"}]
+        relations = [[name, "on_top_of", "Table-1"]]
+        file.write_text(json.dumps({"format": 1, "nodes": nodes, "relations": relations}))
+
+    write(one, "Mug-1\u202e1-guM")
+    write(two, "Mug-2")
+    assert call(["compare", str(one), str(two)]) == 0
+    shown = capsys.readouterr().out
+    assert r"Mug-1\u202e1-guM" in shown and "\u202e" not in shown
+    write(two, "Mug-1\x1b[2J\x1b]0;owned\x07")
+    assert call(["compare", str(one), str(two)]) == 2
+    told = capsys.readouterr().err
+    assert r"nodes[0].id: a name" in told and r"Mug-1\x1b[2J" in told
+    assert not any(c in told for c in "\x1b\x07") and told.count("\n") == 1
+    two.rename(tmp_path / "three\x1b[31m.json")
+    assert call(["compare", str(one), str(tmp_path / "three\x1b[31m.json")]) == 2
+    assert "\x1b" not in capsys.readouterr().err

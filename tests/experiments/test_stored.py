@@ -1,0 +1,87 @@
+"""A folder of results that was cut off, edited or made by others: one sentence, with its place."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from forestall.cli.main import call
+from forestall.experiments.folder import ABOUT, EFFORT, ROWS
+
+MADE = Path(__file__).parents[1] / "fuzz" / "corpus" / "results" / "all"
+
+Edit = Callable[[dict[str, Any]], object]
+
+LINES: list[tuple[str, Edit | str, str]] = [
+    (EFFORT, lambda d: d.pop("choice"), "effort.jsonl, line 1: choice: Field required"),
+    (EFFORT, lambda d: d["choice"].pop("limit"), "effort.jsonl, line 1: choice.limit: Field req"),
+    (EFFORT, lambda d: d.update(choice="\x1b[31m"), "effort.jsonl, line 1: choice: "),
+    (EFFORT, lambda d: d["choice"].update(sets=1e308), "choice.sets: Input should be a valid list"),
+    (EFFORT, lambda d: d["choice"].update(strategies=[None]), "choice.strategies.0"),
+    (EFFORT, lambda d: d["choice"].update(split="tomorrow"), "unknown split 'tomorrow'"),
+    (EFFORT, lambda d: d["choice"].update(rounds=10**18), "seeds for each scenario"),
+    (EFFORT, lambda d: d.update(machine=7), "machine: Input should be a valid string, got 7"),
+    (EFFORT, lambda d: d.update(seconds="2"), "seconds: Input should be a valid number"),
+    (EFFORT, "{}", "effort.jsonl, line 1: jobs: Field required"),
+    (EFFORT, "[]", "effort.jsonl, line 1: the document: "),
+    (EFFORT, '{"jobs": NaN}', "effort.jsonl, line 1: damaged: NaN is no number"),
+    (EFFORT, "[" * 10_000, "effort.jsonl, line 1: damaged: it nests too deeply"),
+    (EFFORT, '{"a": 1, "a": 1}', "'a' is given twice"),
+    (ROWS, lambda d: d.pop("judged"), "episodes.jsonl, line 1: judged: "),
+    (ROWS, lambda d: d.update(seed="1"), "episodes.jsonl, line 1: seed: "),
+    (ROWS, lambda d: d.update(more=1), "more: "),
+    (ROWS, lambda d: d["judged"][0].update(score="high"), "judged.0.score: "),
+    (ROWS, "null", "a result of format None"),
+    (ROWS, '{"format"', "line 1: damaged or truncated"),
+]
+
+
+def broken(tmp_path: Path, file: str, edit: Edit | str) -> Path:
+    folder = Path(shutil.copytree(MADE, tmp_path / "results"))
+    lines = (folder / file).read_text().splitlines()
+    if callable(edit):
+        data = json.loads(lines[0])
+        edit(data)
+        edit = json.dumps(data)
+    (folder / file).write_text("\n".join([edit, *lines[1:]]) + "\n")
+    return folder
+
+
+@pytest.mark.parametrize(("file", "edit", "says"), LINES)
+def test_a_line_that_is_none(
+    file: str, edit: Edit | str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["bench", "report", str(broken(tmp_path, file, edit))]) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count("\n") == 1 and str(tmp_path) in told
+
+
+ABOUTS: list[tuple[Edit | str, str]] = [
+    ("", "experiment.json is empty"),
+    ("{", "experiment.json: damaged or truncated"),
+    ("7", "experiment.json: no experiment"),
+    (lambda d: d.pop("split"), "experiment.json: split: Field required"),
+    (lambda d: d.update(rounds="1"), "rounds: Input should be a valid integer, got '1'"),
+    (lambda d: d.update(settings=[]), "settings: "),
+    (lambda d: d["settings"].update(parts={"world": {}}), "settings.parts.world.name"),
+]
+
+
+@pytest.mark.parametrize(("edit", "says"), ABOUTS)
+def test_a_description_that_is_none(
+    edit: Edit | str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = Path(shutil.copytree(MADE, tmp_path / "results"))
+    if callable(edit):
+        data = json.loads((folder / ABOUT).read_text())
+        edit(data)
+        edit = json.dumps(data)
+    (folder / ABOUT).write_text(edit)
+    assert call(["bench", "report", str(folder)]) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count("\n") == 1

@@ -1,0 +1,1 @@
+"""Damaged inputs over every reader; see `__main__.py`."""

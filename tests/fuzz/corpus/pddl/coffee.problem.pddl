@@ -1,0 +1,5 @@
+(define (problem morning)
+  (:domain coffee)
+  (:objects mug - cup office-2 - place)
+  (:init (at robby office-2) (at mug kitchen-desk))
+  (:goal (and (at mug office-2) (full mug))))

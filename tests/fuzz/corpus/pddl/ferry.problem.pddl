@@ -1,0 +1,5 @@
+(define (problem one-each-way)
+  (:domain ferry)
+  (:objects c0 c1 - car l0 l1 - location)
+  (:init (at c0 l0) (at c1 l1) (at-ferry l0) (empty-ferry))
+  (:goal (and (at c0 l1) (at c1 l0))))
