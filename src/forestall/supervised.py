@@ -166,9 +166,6 @@ class SupervisedParts:
             (answer.replan, Replan | None),
         ):
             checked_answer(name, given, kinds)
-        score = None if answer.verdict is None else answer.verdict.score
-        if score is not None and not math.isfinite(score):
-            raise PartError(name, f"gave the score {score}", internal=True)
         plan = None if answer.replan is None else answer.replan.plan
         if plan is not None:
             try:

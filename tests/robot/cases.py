@@ -178,9 +178,9 @@ def _renamed(graph: SceneGraph) -> SceneGraph:
 
 
 def _flooded(graph: SceneGraph) -> SceneGraph:
-    """Two thousand things that are not there."""
+    """Fifteen hundred things that are not there."""
     like = next(n for n in graph.nodes if n.box_m is not None)
-    more = tuple(replace(like, id=f"{like.category}-{1000 + k}") for k in range(2000))
+    more = tuple(replace(like, id=f"{like.category}-{1000 + k}") for k in range(1500))
     return SceneGraph((*graph.nodes, *more), graph.relations, None, graph.hidden)
 
 
@@ -541,7 +541,8 @@ CASES: tuple[Case, ...] = (
         "judge",
         changes(lambda v: replace(v, score=float("nan"))),
         after=1,
-        blamed="strategy proactive",
+        kind=TroubleKind.FAILED,
+        blamed="detector scene-graph",
     ),
     _mine(
         "alarms at everything",
