@@ -11,10 +11,10 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from forestall.domain.model import Domain
-from forestall.errors import InputError
+from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import category_of, is_instance
 from forestall.types.plan import Subtask
 
@@ -140,6 +140,23 @@ class Names:
 
     def __contains__(self, said: str) -> bool:
         return said in self._named
+
+
+def stated(given: Mapping[str, str], category: str, domain: Domain) -> dict[str, str]:
+    """The states that somebody tells of a thing; of what the domain lacks it keeps none.
+
+    Raises:
+        UnknownNameError: an attribute that the category has not, or another value.
+    """
+    known = domain.find(category)
+    if known is None:
+        return {}
+    for attribute, value in given.items():
+        if attribute not in known.attributes:
+            raise UnknownNameError(f"attribute of {category}", attribute, known.attributes)
+        if value not in domain.values(attribute):
+            raise UnknownNameError(f"value of {attribute}", value, domain.values(attribute))
+    return dict(given)
 
 
 def _letters(text: str) -> str:

@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
-from forestall.domain.words import Names
+from forestall.domain.words import Names, stated
 from forestall.errors import FileFormatError, InputError, PerceptionError, UnknownNameError
 from forestall.perception.conventions import (
     CameraAxes,
@@ -292,8 +292,8 @@ class _Reading:
         """Take down the states of a thing; of what the domain does not know it has none."""
         if instance is None:
             raise InputError(f"states need an instance, for example {category}-1")
-        if self._domain.find(category) is not None:
-            told = _states(given, category, self._domain)
+        told = stated(given, category, self._domain)
+        if told:
             self.states.setdefault(instance, {}).update(told)
 
 
@@ -321,16 +321,6 @@ def _mask(
     if not mask.any():
         raise FileFormatError(f"{where}: the mask of this {given.category} is empty")
     return mask
-
-
-def _states(given: Mapping[str, str], category: str, domain: Domain) -> dict[str, str]:
-    known = domain[category].attributes
-    for attribute, value in given.items():
-        if attribute not in known:
-            raise UnknownNameError(f"attribute of {category}", attribute, known)
-        if value not in domain.values(attribute):
-            raise UnknownNameError(f"value of {attribute}", value, domain.values(attribute))
-    return dict(given)
 
 
 def _below(frame: Frame) -> _Vec3:

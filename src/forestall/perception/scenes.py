@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.domain.model import Domain
-from forestall.domain.words import Names
+from forestall.domain.words import Names, stated
 from forestall.errors import InputError, PerceptionError, UnknownNameError
 from forestall.perception.boxes import box_mask
 from forestall.perception.conventions import (
@@ -278,7 +278,7 @@ class Scenes:
             instance,
             float(found.score),
             found.mask is not None,
-            self._states(found.states, category),
+            tuple(sorted(stated(found.states, category, self._domain).items())),
         )
 
     def _mask(self, found: Found, camera: Intrinsics, depth: Depth, located: bool) -> Mask:
@@ -289,18 +289,6 @@ class Scenes:
         if found.box is None:
             raise InputError("give a mask or a box")
         return box_mask(found.box, shape, depth if located else None, camera)
-
-    def _states(self, given: Mapping[str, str], category: str) -> tuple[tuple[str, str], ...]:
-        known = self._domain.find(category)
-        if known is None:
-            return ()
-        for attribute, value in given.items():
-            if attribute not in known.attributes:
-                raise UnknownNameError(f"attribute of {category}", attribute, known.attributes)
-            values = self._domain.values(attribute)
-            if value not in values:
-                raise UnknownNameError(f"value of {attribute}", value, values)
-        return tuple(sorted(given.items()))
 
 
 _UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 1.0], [0, 0, 0, 1.0]])
