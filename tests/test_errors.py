@@ -5,19 +5,20 @@ import pickle
 import pytest
 
 from forestall import errors
-from forestall.errors import ForestallError, UnknownNameError
+from forestall.errors import ForestallError, PartError, UnknownNameError
 
 
 @pytest.mark.parametrize(
     "error",
     [
         UnknownNameError("task", "heat-potatoe", ["heat-potato", "toast-bread"]),
+        PartError("observe", "did not answer within 10 s", late=True, world=True),
         *(
             kind("one line")
             for kind in vars(errors).values()
             if isinstance(kind, type)
             and issubclass(kind, ForestallError)
-            and kind is not UnknownNameError
+            and kind not in (PartError, UnknownNameError)
         ),
     ],
     ids=lambda e: type(e).__name__,

@@ -338,15 +338,17 @@ def test_a_subtask_further_on_skips_what_lies_between() -> None:
         monitor.before(scene())
 
 
-def test_an_error_in_a_part_comes_out_as_it_is() -> None:
+def test_an_error_in_a_part_holds_and_is_named() -> None:
     class Broken(Scripted):
         def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
             raise PerceptionError("the camera is gone")
 
     monitor = Monitor(Broken(), shipped("household"), config=MonitorConfig(on_not_judged="proceed"))
     monitor.start(PLAN)
-    with pytest.raises(PerceptionError, match="camera"):
-        monitor.before(scene())
+    decision = monitor.before(scene())
+    assert (decision.outcome, decision.hold) == (Outcome.HOLD, Hold.INTERNAL)
+    assert not decision.may_start
+    assert decision.why == "strategy scripted: the camera is gone"
     with pytest.raises(InputError, match="judged before"):
         monitor.after(DONE)
 

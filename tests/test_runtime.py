@@ -22,6 +22,7 @@ from forestall.strategies.none import NoReplanning
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, wrap
 from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
 from forestall.tasks.goals import TruthGoalChecker
+from forestall.types.decision import Outcome
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import (
     BoundaryRecord,
@@ -29,6 +30,7 @@ from forestall.types.episode import (
     EpisodeRecord,
     SkillOutcome,
     SkillStatus,
+    TroubleKind,
 )
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Observation
@@ -237,9 +239,13 @@ def test_an_error_in_the_middle_is_recorded() -> None:
     strategy = make_strategy(config, loaded.domain, None)
     runtime = Runtime(kitchen, Broken(kitchen, loaded.domain), strategy, loaded.domain)
     record = runtime.run(loaded.task, loaded.task.plan, 0)
-    assert record.end is EpisodeEnd.ERROR
-    assert record.failures == ("the run broke off: the camera is gone",)
-    assert len(record.executed) == len(record.boundaries) == 2
+    assert record.end is EpisodeEnd.HELD
+    assert record.failures == ("the robot was held: perceiver: the camera is gone",)
+    assert record.trouble is not None
+    assert (record.trouble.kind, record.trouble.part) == (TroubleKind.FAILED, "perceiver")
+    assert record.notes == ("hold: the robot was told and has answered",)
+    assert record.boundaries[-1].outcome is Outcome.HOLD
+    assert len(record.executed) == len(record.boundaries) - 1 == 2
 
 
 class Forgetful(TruthPerceiver):

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from forestall.domain.model import Domain as Domain
     from forestall.errors import ForestallError as ForestallError
     from forestall.errors import InputError as InputError
+    from forestall.errors import PartError as PartError
     from forestall.learning.learn import Learnt as Learnt
     from forestall.learning.learn import learn as learn
     from forestall.memory.store import SqliteStore as Memory
     from forestall.memory.store import open_store as open_memory
+    from forestall.supervision import Limits as Limits
     from forestall.types.decision import Hold as Hold
     from forestall.types.decision import MonitorDecision as MonitorDecision
     from forestall.types.decision import Outcome as Outcome
@@ -71,6 +73,7 @@ _PUBLIC = {
     "InputError": "errors",
     "Intrinsics": "types.observation",
     "Learnt": "learning.learn",
+    "Limits": "supervision",
     "Literal": "types.facts",
     "Memory": "memory.store:SqliteStore",
     "Monitor": "assembly.monitor",
@@ -79,6 +82,7 @@ _PUBLIC = {
     "ObjectNode": "types.graph",
     "Observation": "types.observation",
     "Outcome": "types.decision",
+    "PartError": "errors",
     "Plan": "types.plan",
     "Relation": "types.graph",
     "SceneGraph": "types.graph",
@@ -112,6 +116,7 @@ __all__ = [
     "InputError",
     "Intrinsics",
     "Learnt",
+    "Limits",
     "Literal",
     "Memory",
     "Monitor",
@@ -120,6 +125,7 @@ __all__ = [
     "ObjectNode",
     "Observation",
     "Outcome",
+    "PartError",
     "Plan",
     "Relation",
     "SceneGraph",

@@ -6,10 +6,11 @@ whether going on was judged, was not judged, or would be in spite of an alarm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from forestall.errors import InputError
+from forestall.supervision import Limits
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
@@ -30,6 +31,8 @@ class MonitorConfig:
             reference, an argument is not located, or the strategy does not judge here.
         on_alarm: whether a subtask may start in spite of an alarm that the strategy lets pass: it
             was not explained, no plan was found, it was repaired too often, or is only watched.
+        limits: how long perception and strategy may take, and how often in a row something may go
+            wrong.
 
     Raises:
         InputError: a policy that is neither "proceed" nor "hold", or a bound out of range.
@@ -40,6 +43,7 @@ class MonitorConfig:
     max_looks: int = 2
     on_not_judged: Policy = "hold"
     on_alarm: Policy = "hold"
+    limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
         for name in ("on_not_judged", "on_alarm"):

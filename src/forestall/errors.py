@@ -9,7 +9,8 @@ ForestallError
 ├── MemoryFileError        the demonstration file is empty, of another version, damaged or locked
 ├── ModelFileError         a model is missing or damaged, or cannot be run here
 ├── SceneError             a scene cannot be built as asked (no room, contradictory needs)
-└── PerceptionError        an observation that cannot be used (NaN depth, wrong shapes)
+├── PerceptionError        an observation that cannot be used (NaN depth, wrong shapes)
+└── PartError              a part of a run that raised, gave nonsense or did not answer in time
 """
 
 from __future__ import annotations
@@ -102,3 +103,41 @@ class SceneError(ForestallError):
 
 class PerceptionError(ForestallError):
     """An observation that cannot be used."""
+
+
+class PartError(ForestallError):
+    """A part of a run that raised something, gave nonsense or did not answer in time.
+
+    Args:
+        part: which one, e.g. "observe", "detector scene-graph".
+        why: what it did, in words.
+        late: whether it did not answer in time.
+        internal: whether it is a mistake in a program, and not an error that was raised on purpose.
+        world: whether the part is the world.
+    """
+
+    def __init__(
+        self,
+        part: str,
+        why: str,
+        *,
+        late: bool = False,
+        internal: bool = False,
+        world: bool = False,
+    ) -> None:
+        text = f"{part} {why}" if late else f"{part}: {why}"
+        super().__init__(f"internal error in {text}" if internal and not world else text)
+        self.part, self.why = part, why
+        self.late, self.internal, self.world = late, internal, world
+
+    @property
+    def senses(self) -> bool:
+        """Whether it is what the robot sees that cannot be believed."""
+        return isinstance(self.__cause__, ObservationError)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_part_error, (self.part, self.why, self.late, self.internal, self.world))
+
+
+def _part_error(part: str, why: str, late: bool, internal: bool, world: bool) -> PartError:
+    return PartError(part, why, late=late, internal=internal, world=world)

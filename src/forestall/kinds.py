@@ -23,6 +23,7 @@ from forestall.seams import (
     TextEncoder,
     WorldPart,
 )
+from forestall.supervision import Limits
 from forestall.types.kind import Kind
 
 WORLD = Kind[WorldPart]("world", WorldPart)
@@ -39,4 +40,5 @@ DETECTOR = Kind[Detector]("detector", Detector)
 REASONER = Kind[Reasoner]("reasoner", Reasoner)
 REPLANNER = Kind[Replanner]("replanner", Replanner)
 VALIDATOR = Kind[PlanValidator]("validator", PlanValidator)
+LIMIT = Kind[Limits]("limit", Limits)
 STRATEGY = Kind[Strategy]("strategy", Strategy)

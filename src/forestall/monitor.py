@@ -2,8 +2,8 @@
 
 Whoever owns the robot calls it: the episode loop (`runtime.py`), a replay of stored data, an
 executive of the user's own. It calls perceiver and strategy, which come through the constructor;
-where the run stands is in `run_state.py`, what an answer comes to in `conclusion.py`. An exception
-in a part comes out as the error that it is.
+where the run stands is in `run_state.py`, what an answer comes to in `conclusion.py`. A part that
+raises or does not answer in time is a "hold" that names it (`supervision.py`), never an answer.
 
     monitor.start(task)
     monitor.observe(first_look)
@@ -16,19 +16,20 @@ A scene is an observation (RGB-D), a scene graph, or one in its short form (`typ
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from forestall.conclusion import MonitorConfig, conclude
-from forestall.errors import InputError, UnknownNameError
-from forestall.records.boundary import boundary_record
+from forestall.conclusion import MonitorConfig
+from forestall.errors import InputError, PartError, UnknownNameError
+from forestall.moments import Moments
 from forestall.run_state import RunState
+from forestall.senses import Senses
+from forestall.supervised import SupervisedParts
+from forestall.supervision import Supervisor
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
-from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
@@ -63,6 +64,7 @@ class Monitor:
         config: bounds and policies.
         scope: the part of a graph that concerns a subtask; the perceiver's own by default, without
             one the whole graph.
+        supervisor: calls perceiver and strategy; one of its own by default.
     """
 
     def __init__(
@@ -72,12 +74,19 @@ class Monitor:
         perceiver: Perceiver | None = None,
         config: MonitorConfig | None = None,
         scope: Callable[[SceneGraph, Subtask], SceneGraph] | None = None,
+        supervisor: Supervisor | None = None,
     ) -> None:
         self._strategy = strategy
         self._domain = domain
-        self._perceiver = perceiver
         self._config = config or MonitorConfig()
-        self._scope = scope or (_whole if perceiver is None else perceiver.scope)
+        self._parts = SupervisedParts(
+            strategy,
+            perceiver,
+            scope or (_whole if perceiver is None else perceiver.scope),
+            domain,
+            supervisor or Supervisor(self._config.limits),
+        )
+        self._moments = Moments(self._parts, self._config, strategy.name)
         self._state: RunState | None = None
         self._awaited: tuple[BoundaryContext, SkillOutcome] | None = None  # a look after it
 
@@ -87,14 +96,19 @@ class Monitor:
         Args:
             task: goal and names; a plan alone is a task without a goal condition.
             plan: the plan to start with, the task's own by default.
+
+        Raises:
+            PartError: the perceiver cannot be reset, or has not come back from an earlier run.
         """
         if isinstance(task, Plan):
             task = Task(task.goal, task.goal, Goal(task.goal), task, SceneNeeds())
         first = task.plan if plan is None else plan
-        self._state = RunState(task, first, self._domain, first)
+        self._state = RunState(
+            task, first, self._domain, first, Senses(self._config.limits.max_unchanged)
+        )
         self._awaited = None
-        if self._perceiver is not None:
-            self._perceiver.reset()
+        self._moments.failed = None
+        self._parts.reset()
 
     def check(self, scene: Scene, subtask: Subtask | str) -> MonitorDecision:
         """May this one subtask start in this scene? A run that is going on is forgotten.
@@ -111,14 +125,21 @@ class Monitor:
         wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
         if wanted.skill in self._domain.skills:
             self._domain.check(wanted)
-        self.start(Plan((wanted,)))
+        try:
+            self.start(Plan((wanted,)))
+        except PartError as error:
+            return self._moments.hold_for(error, wanted)
         self._run.looks = self._config.max_looks - 1
         return self.before(scene)
 
     def observe(self, observation: Scene) -> None:
-        """The first look around: it is remembered, nothing is judged."""
+        """The first look around: it is remembered, nothing is judged.
+
+        Raises:
+            PartError: the perceiver failed, was late, or cannot believe what it was given.
+        """
         with self._run.phase("perceive"):
-            self._see(observation)
+            self._moments.see(self._run, self._read(observation))
         self._run.mark()
 
     def before(self, observation: Scene, subtask: Subtask | str | None = None) -> MonitorDecision:
@@ -172,16 +193,21 @@ class Monitor:
             run.mark()
             assert run.last is not None
             told = replace(outcome, reason="")  # it may name what the robot has not seen
+            if (held := self._moments.too_many(run, run.last.subtask)) is not None:
+                return held
             if self._strategy.looks_after is not LooksAfter.SUBTASK:
                 known = replace(run.last, refused=tuple(run.refused()))
-                answer = self._strategy.after_subtask(known, told)
+                try:
+                    answer = self._parts.judge(self._strategy.after_subtask, known, told)
+                except PartError as error:
+                    return self._moments.hold_for(error, run.last.subtask)
                 silent = answer.decision is Decision.PROCEED and answer.verdict is None
                 over = replace(run.last, when=When.AFTER, may_look=False)
-                return None if silent else self._conclude(over, answer)
+                return None if silent else self._moments.conclude(run, over, answer)
             self._awaited = (run.last, told)
         context, told = self._awaited
         if observation is None:
-            return self._look(context.subtask, "what a subtask has led to is judged")
+            return self._moments.look(run, context.subtask, "what a subtask has led to is judged")
         decision = self._judge(
             When.AFTER,
             context.index,
@@ -212,9 +238,12 @@ class Monitor:
             return MonitorDecision(Outcome.NOT_JUDGED, may, why="nothing was executed")
         if observation is None:
             if self._strategy.looks_after is not LooksAfter.NOTHING:
-                return self._look(last.subtask, "what the plan has led to is judged")
-            answer = self._strategy.after_episode(last)
-            return self._conclude(replace(last, when=When.END, may_look=False), answer)
+                return self._moments.look(run, last.subtask, "what the plan has led to is judged")
+            try:
+                answer = self._parts.judge(self._strategy.after_episode, last)
+            except PartError as error:
+                return self._moments.hold_for(error, last.subtask)
+            return self._moments.conclude(run, replace(last, when=When.END, may_look=False), answer)
         decision = self._judge(
             When.END, len(run.plan), last.subtask, observation, self._strategy.after_episode
         )
@@ -251,6 +280,11 @@ class Monitor:
         """The newest subtask that was judged before it started, None where none was yet."""
         context = self._run.last
         return None if context is None else context.subtask
+
+    @property
+    def failed(self) -> PartError | None:
+        """What the newest "hold" comes from, where a part failed or was late."""
+        return self._moments.failed
 
     @property
     def bound(self) -> dict[str, str]:
@@ -317,75 +351,23 @@ class Monitor:
             return MonitorDecision(Outcome.NOT_JUDGED, False, planned, why=str(error))
         return None
 
-    def _see(self, observation: Scene) -> None:
-        run = self._run
-        if isinstance(observation, Mapping):
-            observation = scene_graph(observation)
-        if isinstance(observation, SceneGraph):
-            run.graph = replace(observation, subtask=None)
-            hand = observation.get(GRIPPER)
-            if hand is not None and hand.centroid_m is not None:
-                run.robot_world_m = hand.centroid_m
-            return
-        if self._perceiver is None:
-            raise InputError("this monitor has no perceiver: give it a scene graph")
-        run.graph = self._perceiver.perceive(observation)
-        run.robot_world_m = observation.robot_position_world_m
-        run.time_s = observation.time_s
-
     def _judge(
         self,
         when: When,
         index: int,
         subtask: Subtask | None,
-        observation: Scene,
+        scene: Scene,
         ask: Callable[[BoundaryContext], StrategyAnswer],
     ) -> MonitorDecision:
-        """One look of one moment: fuse, ask the strategy, conclude, record."""
-        run = self._run
-        with run.phase("perceive"):
-            self._see(observation)
-            picture = observation if isinstance(observation, Observation) else None
-            subtask = run.ground() if subtask is None else subtask
-            looks = self._config.max_looks
-            context = run.context(when, index, subtask, self._scope, picture, looks)
-        started = time.perf_counter()
-        answer = ask(context)
-        spent = time.perf_counter() - started
-        for name, seconds in answer.seconds:
-            run.book(name, seconds)
-        run.book("strategy", max(0.0, spent - sum(s for _, s in answer.seconds)))
-        number = run.boundary - (when is When.AFTER)
-        decision = self._conclude(context, answer)
-        record = boundary_record(
-            number, context, answer, decision.outcome, run.since, run.seconds, run.time_s
-        )
-        run.mark()
-        if when is When.BEFORE:
-            run.last, run.ready = context, decision.outcome is not Outcome.REPLAN
-        if decision.outcome is Outcome.LOOK:
-            run.looks = context.looks
-        else:
-            run.looks = 0
-            run.boundary += when is not When.AFTER
-        return replace(decision, context=context, record=record, seconds=record.seconds)
+        return self._moments.judge(self._run, when, index, subtask, self._read(scene), ask)
 
-    def _conclude(self, context: BoundaryContext, answer: StrategyAnswer) -> MonitorDecision:
-        """What a strategy's answer comes to; a new plan is adopted here."""
-        run = self._run
-        decision = conclude(context, answer, self._config, self._strategy.name)
-        if decision.plan is not None:
-            run.adopt(decision.plan)
-            self._awaited = None
-        elif decision.outcome is Outcome.LOOK:
-            return replace(decision, look_at=run.views(context.subtask))
-        elif context.when is When.BEFORE:
-            return replace(decision, command=run.command(context.subtask, context.index))
-        return decision
-
-    def _look(self, subtask: Subtask, why: str) -> MonitorDecision:
-        views = self._run.views(subtask)
-        return MonitorDecision(Outcome.LOOK, False, subtask, look_at=views, why=why)
+    def _read(self, scene: Scene) -> Observation | SceneGraph:
+        """What can be judged; raises InputError where it is neither a picture nor a scene."""
+        if isinstance(scene, Mapping):
+            return scene_graph(scene)
+        if not isinstance(scene, SceneGraph) and not self._parts.perceives:
+            raise InputError("this monitor has no perceiver: give it a scene graph")
+        return scene
 
 
 def _ended(outcome: SkillOutcome | str, reason: str) -> SkillOutcome:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 from forestall.domain.names import executable, ground_subtask
 from forestall.errors import InputError
+from forestall.in_a_row import Streaks
+from forestall.senses import Senses
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
 from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import SceneGraph
@@ -69,6 +71,7 @@ class RunState:
         first_plan: the plan that the run started with.
         domain: resolves names.
         plan: the plan at hand.
+        senses: whether what is seen can be so.
         position: in it, of the subtask that comes next.
         replans: how many plans were adopted.
         looks: taken at the boundary that is open, 0 where none is.
@@ -82,6 +85,7 @@ class RunState:
         robot_world_m: where the robot stands.
         worked_at: where the hand let go last.
         time_s: of the robot's clock.
+        streaks: what has gone wrong in a row.
         seconds: measured time by phase; `since` is the same when the boundary began.
     """
 
@@ -89,6 +93,7 @@ class RunState:
     first_plan: Plan
     domain: Domain
     plan: Plan
+    senses: Senses
     position: int = 0
     replans: int = 0
     looks: int = 0
@@ -103,6 +108,7 @@ class RunState:
     robot_world_m: Vec3 = (0.0, 0.0, 0.0)
     worked_at: Vec3 | None = None
     time_s: float = 0.0
+    streaks: Streaks = field(default_factory=Streaks)
     seconds: dict[str, float] = field(default_factory=dict)
     since: dict[str, float] = field(default_factory=dict)
 
@@ -210,6 +216,9 @@ class RunState:
         self.executed.append(ExecutedRecord(command, outcome, self.boundary - 1))
         self.position += 1
         self.ready = False
+        self.streaks.executed(outcome.status is SkillStatus.SUCCEEDED)
+        if outcome.status is SkillStatus.SUCCEEDED:
+            self.senses.done(bool(self.domain.skill(command.skill).effects))
 
     def context(
         self,

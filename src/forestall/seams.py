@@ -58,6 +58,13 @@ class Environment(Protocol):
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; refuse with a reason when its needs are not met."""
 
+    def hold(self) -> None:
+        """Stop all motion where it is, and keep what is held; nothing moves again before `reset`.
+
+        Until then a skill is refused, and looking turns nothing. May be called at any time, more
+        than once, and from another thread while another call has not come back.
+        """
+
     @property
     def time_s(self) -> float:
         """Simulated time since reset."""

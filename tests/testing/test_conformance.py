@@ -91,3 +91,25 @@ def test_a_refusal_without_a_reason_is_found() -> None:
             return SkillOutcome(outcome.status, outcome.duration_s)
 
     assert any("without a reason" in c for c in check_environment(Silent, 0, STEPS, HOUSEHOLD))
+
+
+def test_an_arm_that_lets_go_or_goes_on_after_hold_is_found() -> None:
+    class LettingGo(_Broken):
+        def hold(self) -> None:
+            self._inner.drop_held()
+            self._inner.hold()
+
+    class Deaf(_Broken):
+        def hold(self) -> None:
+            pass
+
+    class Failing(_Broken):
+        def hold(self) -> None:
+            raise RuntimeError("no brake")
+
+    found = check_environment(LettingGo, 3, STEPS, HOUSEHOLD)
+    assert "hold lets go of Mug-1" in found
+    deaf = check_environment(Deaf, 3, STEPS, HOUSEHOLD)
+    assert any("is not refused with a reason" in c for c in deaf)
+    assert any("after hold the robot" in c for c in deaf)
+    assert any("hold raises" in c for c in check_environment(Failing, 3, STEPS, HOUSEHOLD))

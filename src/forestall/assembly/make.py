@@ -16,12 +16,13 @@ from typing import Any
 
 import forestall
 from forestall.assembly.configuration import RunConfig, digest_of
+from forestall.assembly.options import built
 from forestall.assembly.parts import Assembly
-from forestall.assembly.registry import known
+from forestall.assembly.registry import find, known
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.kinds import PERCEIVER, STATES, STRATEGY, WORLD
+from forestall.kinds import LIMIT, PERCEIVER, STATES, STRATEGY, WORLD
 from forestall.runtime import Runtime, RuntimeConfig
 from forestall.seams import Listener, OpenWorld, OracleView, Strategy, WorldPart
 from forestall.tasks.faults import (
@@ -202,7 +203,12 @@ def provenance(config: RunConfig) -> tuple[tuple[str, Any], ...]:
 
 
 def _limits(config: RunConfig) -> RuntimeConfig:
-    return RuntimeConfig(keep_observations=config.keep_observations, final_look=config.final_look)
+    choice = config.choice(LIMIT)
+    return RuntimeConfig(
+        keep_observations=config.keep_observations,
+        final_look=config.final_look,
+        limits=built(find(choice.kind, choice.name), dict(choice.given), None),
+    )
 
 
 def _version(package: str) -> str | None:

@@ -14,7 +14,7 @@ from forestall.assembly.parts import Assembly
 from forestall.assembly.sources import Source, demonstrations_from
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
-from forestall.kinds import DOMAIN, PERCEIVER, STRATEGY
+from forestall.kinds import DOMAIN, LIMIT, PERCEIVER, STRATEGY
 from forestall.learning.learn import learn
 from forestall.monitor import Monitor as RunMonitor
 from forestall.types.demonstration import Demonstration
@@ -65,7 +65,8 @@ class Monitor(RunMonitor):
                 is needed, what always changed is what it does; `limits` says what that leaves out.
             hands: node ids of the robot's hands for a domain that is learnt; by default the nodes
                 that are called grippers.
-            config: bounds and policies; by default the robot holds where nothing was judged.
+            config: bounds and policies; by default the robot holds where nothing was judged, and
+                the limits are the options of the part `limit`: `limit={"perceive_s": 2}`.
             **options: parts and their options: `detector="scene-graph"`,
                 `detector={"name": "preconditions", "threshold": 0.3}`; `forestall parts` lists
                 them. `Given` as the keyword `given` is what a file or flags said.
@@ -90,7 +91,7 @@ class Monitor(RunMonitor):
             parts.part(STRATEGY),
             own,
             None if domain is None else parts.part(PERCEIVER),
-            config,
+            config or MonitorConfig(limits=parts.part(LIMIT)),
         )
         monitor.domain, monitor.limits = own, limits
         monitor.demonstrations = tuple(demonstrations)

@@ -132,6 +132,7 @@ TABLES: Mapping[str, Table] = {
                 "graph": f"{_JUDGING}:graph_validator",
             },
         ),
+        Table(kinds.LIMIT, "patient", {"patient": "forestall.supervision:patient"}),
         Table(
             kinds.STRATEGY,
             "proactive",

@@ -12,6 +12,7 @@ from forestall.domain.model import Domain
 from forestall.embeddings.captions import ListingCaptioner
 from forestall.kinds import IMAGE_ENCODER, SEGMENTER, STATES
 from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.gate_config import WatchConfig
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.given_graph import GraphPassthrough
 from forestall.perception.learned import LearnedStateEstimator
@@ -76,6 +77,7 @@ def graph(
     feature: Feature = _SCORE.feature,
     perception: PerceptionConfig | None = None,
     scope: ScopeConfig | None = None,
+    watch: WatchConfig | None = None,
 ) -> GraphPerceiver:
     """RGB-D to one scene graph over the episode.
 
@@ -84,6 +86,7 @@ def graph(
         feature: what a node's feature encodes; "image" keeps the look of every object.
         perception: every threshold.
         scope: what concerns a subtask.
+        watch: what may change from one observation to the next.
     """
     return GraphPerceiver(
         parts.part(SEGMENTER),
@@ -92,6 +95,7 @@ def graph(
         perception,
         scope,
         image_encoder=look_encoder(parts) if feature is Feature.IMAGE else None,
+        watch=watch or WatchConfig(),
     )
 
 

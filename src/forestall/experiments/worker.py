@@ -11,9 +11,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from forestall.assembly.configuration import Choice, RunConfig, run_config
+from forestall.assembly.configuration import Choice, Given, RunConfig, run_config
 from forestall.assembly.demonstrations import load_memory
 from forestall.assembly.make import Prepared, make_world, needs_memory, prepare, run_episode
+from forestall.errors import ForestallError
 from forestall.experiments.runs import Run, Settings
 from forestall.kinds import WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
@@ -23,9 +24,26 @@ from forestall.seams import WorldPart
 from forestall.statistics.rows import EpisodeRow, Judged
 from forestall.tasks.faults import knowable
 from forestall.tasks.truth import TruthTrace
+from forestall.types.decision import Outcome
 from forestall.types.demonstration import Demonstration
-from forestall.types.episode import BoundaryRecord, EpisodeRecord, SkillStatus
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeEnd,
+    EpisodeRecord,
+    SkillStatus,
+    TroubleKind,
+)
+from forestall.types.runtime import When
 from forestall.types.verdict import Decision, ReplanOutcome
+
+UNLIMITED = {
+    **{f"max_{what}_in_a_row": 0 for what in ("alarms", "repairs", "failures")},
+    "max_unchanged": 0,
+}
+"""An experiment goes on as the paper does, however often something goes wrong, and counts it."""
+
+_BROKEN = (TroubleKind.INTERNAL, TroubleKind.FAILED, TroubleKind.WORLD)
+"""After these nothing was measured; what was late, not believed or too often was held."""
 
 PAGES = "episodes"
 """Folder of the episodes' own pages, inside that of an experiment."""
@@ -58,7 +76,7 @@ def config_of(run: Run, settings: Settings) -> RunConfig:
         seed=case.seed,
         without=run.without,
         keep_observations=False,
-        given=settings.given,
+        given=settings.given.over(Given.named({"limit": UNLIMITED})),
         strategy=run.strategy,
         detector={"name": run.detector, "threshold": run.threshold},
     )
@@ -104,11 +122,12 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
     demonstrations, memory = None, None
     if needs_memory(prepared.config):
         demonstrations, memory = _memory(work.run.case.task, work.settings)
-    listeners = []
     folder = work.page_folder
-    if folder is not None:
-        listeners.append(RunRecorder(folder, page="index.html"))
+    recorder = None if folder is None else RunRecorder(folder, page="index.html")
+    listeners = [] if recorder is None else [recorder]
     record = run_episode(prepared, demonstrations, listeners, memory, trace, _world(prepared))
+    if recorder is not None and not recorder.complete:
+        raise OSError("; ".join(record.notes))
     if folder is not None:
         dull = not work.run.case.failing and record.success and not alarms(record)
         if work.settings.pages == "telling" and dull:
@@ -120,13 +139,18 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
 
 def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace) -> EpisodeRow:
     judged, last = [], len(record.boundaries) - 1
+    if len(trace.moments) <= last:
+        raise ForestallError(f"the truth was not traced to the end: {'; '.join(record.notes)}")
     for position, boundary in enumerate(record.boundaries):
         following = record.boundaries[position + 1] if position < last else None
         if following is not None and _same(boundary, following):
             continue  # another look follows, and that one counts
+        if boundary.outcome is Outcome.HOLD and boundary.verdict is None:
+            continue  # nothing was judged
         moment = trace.moments[position]
         judged.append(_judged(boundary, record, moment.possible, moment.reachable))
-    broke = record.end.value == "error"
+    trouble = record.trouble
+    broke = trouble is not None and trouble.kind in _BROKEN
     return EpisodeRow(
         **_identity(run, prepared),
         success=bool(record.success),
@@ -134,13 +158,16 @@ def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace)
         failures=record.failures,
         harmed=tuple(text for _, text in record.harmed),
         harmed_s=min((at for at, _ in record.harmed), default=None),
-        end=record.end.value,
-        error="; ".join(record.failures) if broke else "",
+        end=EpisodeEnd.ERROR.value if broke else record.end.value,
+        error="" if trouble is None else trouble.text,
         steps=len(prepared.plan),
         executed=len(record.executed),
         refused=sum(e.outcome.status is not SkillStatus.SUCCEEDED for e in record.executed),
         judged=tuple(judged),
         replans=replans(record),
+        not_judged=sum(
+            b.outcome is Outcome.NOT_JUDGED and b.when is When.BEFORE for b in record.boundaries
+        ),
         planner_calls=sum(
             b.replan is not None and b.replan.outcome is not ReplanOutcome.NOTHING_TO_CHANGE
             for b in record.boundaries

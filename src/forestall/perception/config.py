@@ -75,6 +75,10 @@ class PerceptionConfig:
             count as observed.
         glimpse_share: views of a thing with a smaller share of its largest view's pixels, in one
             observation, say nothing about its states.
+        same_share: share of the smaller of two boxes that both must have for a new thing to be one
+            of the same category that was there before and is not seen.
+        max_lost: things of one category whose place is lost that are remembered; the last ones.
+        max_things: things remembered in all; what has not been observed for longest goes first.
         same_place_m: distance over which an untracked detection is the same object as before.
     """
 
@@ -123,6 +127,9 @@ class PerceptionConfig:
     interior_share: float = 0.1
     glimpse_share: float = 0.5
     same_place_m: float = 0.3
+    same_share: float = 0.3
+    max_lost: int = 5
+    max_things: int = 400
 
 
 @dataclass(frozen=True, slots=True)

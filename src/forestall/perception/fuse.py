@@ -15,6 +15,7 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
+from forestall.perception.forgetting import let_go, merge_renamed, remove
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
@@ -55,6 +56,7 @@ class SceneMemory:
         self._held: str | None = None
         self._hands: tuple[GripperState, ...] = ()
         self._relations: list[Relation] = []
+        self.forgotten: tuple[str, ...] = ()  # in the newest observation, for want of room
 
     # --- integration ----------------------------------------------------------------------------
 
@@ -74,8 +76,14 @@ class SceneMemory:
         moved = put | self._carry(places, seen | put)
         if former is not None and former != self._held and former not in seen | put:
             self._drop_from_memory(former, seen)
+        kept = seen | moved | {h.holding for h in self._hands if h.holding is not None}
+        kept |= set(unlocated(views))
+        was = {t.id for t in before}
+        gone = {n for n in was - kept if not self._is_fixture(self.tracks[n].category)}
+        merge_renamed(self.tracks, gone, seen - was, self._config)
         self._forget_gone(fate, seen, moved, views)
         self._replace_cut(seen, fate, former, observation.time_s)
+        self.forgotten = let_go(self.tracks, kept, self._config)
         self._relate(seen, views)
         self._mark(seen, fate, views)
 
@@ -246,13 +254,7 @@ class SceneMemory:
             gone = track.points_world_m is None or bool(np.any(fate.get(name, 0) == Fate.GONE))
             near = any(gap_m(track, p) <= self._config.same_place_m for p in pieces)
             if gone and (near or name == former or track.points_world_m is None):
-                self._remove(name)
-
-    def _remove(self, name: str) -> None:
-        del self.tracks[name]
-        for child in self.tracks.values():
-            if child.parent is not None and child.parent[1] == name:
-                child.parent = None
+                remove(self.tracks, name)
 
     # --- relations and truth values -------------------------------------------------------------
 

@@ -88,9 +88,12 @@ class SenseWatch:
 
     def _frozen(self, last: Observation, now: Observation) -> Iterator[Finding]:
         """The same pictures again, to the last bit."""
-        pairs = list(zip(last.frames, now.frames, strict=False))
+        if len(last.frames) == len(now.frames):
+            pairs = list(zip(last.frames, now.frames, strict=True))
+        else:  # one look, and one all around: a camera that froze shows one picture in both
+            pairs = [(last.frames[-1], frame) for frame in now.frames if last.frames]
         same = [_equal(a, b) for a, b in pairs]
-        if not pairs or len(last.frames) != len(now.frames) or not all(same):
+        if not pairs or not all(same):
             self._equal = 0
             return
         gap_s = now.time_s - last.time_s

@@ -14,7 +14,8 @@ from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
-from forestall.perception.gate_config import GateConfig
+from forestall.perception.gate_config import GateConfig, WatchConfig
+from forestall.perception.gate_time import SenseWatch
 from forestall.perception.naming import name_detections
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
@@ -48,6 +49,7 @@ class GraphPerceiver:
         image_encoder: gives every located thing the feature of its largest crop (f(v) of Eq. 1 as
             an image embedding); without it nodes have none.
         gate: what observations cannot be; None lets everything in.
+        watch: what may change from one observation to the next; by default everything may.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class GraphPerceiver:
         *,
         image_encoder: ImageEncoder | None = None,
         gate: GateConfig | None = _GATE,
+        watch: WatchConfig | None = None,
     ) -> None:
         self._segmenter = segmenter
         self._estimator = state_estimator
@@ -68,6 +71,7 @@ class GraphPerceiver:
         self._scope = scope_config or ScopeConfig()
         self._image_encoder = image_encoder
         self._gate = gate
+        self._watch = None if watch is None else SenseWatch(watch, gate)
         self.findings: tuple[Finding, ...] = ()
         self._memory = SceneMemory(domain, self._config)
 
@@ -75,6 +79,8 @@ class GraphPerceiver:
         """Forget everything."""
         self._memory.reset()
         self.findings = ()
+        if self._watch is not None:
+            self._watch.reset()
 
     def perceive(self, observation: Observation) -> SceneGraph:
         """Fuse an observation and return the whole graph as believed now.
@@ -101,6 +107,9 @@ class GraphPerceiver:
                     known[name] = cloud.centroid_m
             views.append(view)
         self._memory.integrate(observation, views)
+        if self._memory.forgotten:
+            names = ", ".join(self._memory.forgotten)
+            self.findings += (Finding("forgotten", f"no room to remember {names}", refuses=False),)
         return self._memory.graph()
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
@@ -123,8 +132,12 @@ class GraphPerceiver:
         for frame in observation.frames:
             found = self._segmenter.segment(frame)
             masks.append(Masks(found, label_image(found, frame.depth_m.shape)))
+        self.findings = ()
         if self._gate is not None:
             self.findings = inspect(observation, self._domain, self._gate, masks)
+            refuse(self.findings)
+        if self._watch is not None:
+            self.findings += self._watch.look(observation)
             refuse(self.findings)
         return masks
 

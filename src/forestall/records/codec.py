@@ -32,7 +32,7 @@ from forestall.records.derived import (
 )
 from forestall.records.plain import plain
 from forestall.records.verdicts import graph, literal, plan
-from forestall.types.episode import EpisodeEnd, EpisodeRecord
+from forestall.types.episode import EpisodeEnd, EpisodeRecord, Trouble, TroubleKind
 from forestall.types.plan import Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
@@ -67,6 +67,8 @@ def record_to_json(record: EpisodeRecord, *, page: str | None = None) -> dict[st
         "replans": replans(record),
         "executed": [executed_json(e) for e in record.executed],
         "end": record.end if complete else None,
+        "trouble": None if record.trouble is None else _trouble_json(record.trouble),
+        "notes": record.notes,
         "simulated_s": record.simulated_s,
         "compute_s": dict(record.compute_s),
         "computed_s": sum(seconds for _, seconds in record.compute_s),
@@ -118,6 +120,8 @@ def record_from_json(data: Any) -> EpisodeRecord:
         compute_s=field["compute_s"].pairs(Field.number),
         final=field.maybe("final", graph),
         provenance=field["provenance"].pairs(lambda f: f.value),
+        trouble=field.maybe("trouble", _trouble) if field.find("trouble") else None,
+        notes=field["notes"].tuple_of(Field.text) if field.find("notes") else (),
     )
     _check_skills(record, field)
     return record
@@ -199,6 +203,24 @@ def alarm_json(alarm: Alarm) -> dict[str, Any]:
         "replanned": alarm.replanned,
         "outcome": alarm.outcome,
     }
+
+
+def _trouble_json(trouble: Trouble) -> dict[str, Any]:
+    return {
+        "kind": trouble.kind,
+        "part": trouble.part,
+        "text": trouble.text,
+        "trace": trouble.trace,
+    }
+
+
+def _trouble(field: Field) -> Trouble:
+    return Trouble(
+        kind=field["kind"].member(TroubleKind),
+        part=field["part"].text(),
+        text=field["text"].text(),
+        trace=field["trace"].text(),
+    )
 
 
 def _boundaries(record: EpisodeRecord) -> list[dict[str, Any]]:

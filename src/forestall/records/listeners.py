@@ -105,6 +105,8 @@ class ProgressLine:
     def on_end(self, record: EpisodeRecord) -> None:
         """The episode is over."""
         self.close()
+        for note in (*([record.trouble.text] if record.trouble else []), *record.notes):
+            self._say(note, "red")
         result = {True: "succeeded", False: "failed", None: "not scored"}[record.success]
         self._say(
             f"{record.task.name} {result}: {record.end.value}, {len(record.executed)} subtasks, "

@@ -58,6 +58,8 @@ class RunRecorder:
     def __init__(self, folder: Path | str, *, page: str | None = None) -> None:
         self.folder = Path(folder)
         self._page = page
+        self.complete = False
+        """Whether the record of a whole run is written."""
         self._started = False
         self._stored: list[BoundaryRecord] = []
 
@@ -68,7 +70,7 @@ class RunRecorder:
             if name:
                 (self.folder / name).unlink(missing_ok=True)
         (self.folder / LINES_NAME).write_text("", encoding="utf-8")
-        self._started = True
+        self._started, self.complete = True, False
         self._stored = []
         self._write(
             "start",
@@ -108,6 +110,7 @@ class RunRecorder:
             record = replace(record, boundaries=stored)
         write_record(self.folder, record, page=self._page)
         self._write("end", end=record.end.value)
+        self.complete = True
 
     def _write(self, what: str, **fields: Any) -> None:
         if not self._started:

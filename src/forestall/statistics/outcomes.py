@@ -23,7 +23,7 @@ DETECTOR = "scene-graph"
 THRESHOLD = 0.9
 """What a strategy runs with unless its name says otherwise."""
 
-ERROR, STOPPED = "error", "stopped safely"
+ERROR, HELD, STOPPED = "error", "held", "stopped safely"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +103,7 @@ def outcome_metrics(runs: Sequence[EpisodeRow]) -> dict[str, Metric]:
         "prevented": proportion([prevented(r) for r in runs]),
         "errors": proportion([r.end == ERROR for r in runs]),
         "stopped": proportion([r.end == STOPPED for r in runs]),
+        "held": proportion([r.end == HELD for r in runs]),
         "replanned": proportion([r.replans > 0 for r in runs]),
         "simulated_s": _mean(timed, lambda r: r.simulated_s),
         "simulated_s_successful": _mean(good, lambda r: r.simulated_s),
@@ -111,6 +112,7 @@ def outcome_metrics(runs: Sequence[EpisodeRow]) -> dict[str, Metric]:
         "tet_s": _mean(timed, lambda r: r.simulated_s + r.reasoning_s),
         "tet_s_successful": _mean(good, lambda r: r.simulated_s + r.reasoning_s),
         "replans": _mean(runs, lambda r: r.replans),
+        "not_judged": _mean(runs, lambda r: r.not_judged),
         "planner_calls": _mean(runs, lambda r: r.planner_calls),
         "model_calls": _mean(runs, lambda r: r.model_calls),
     }

@@ -92,7 +92,8 @@ class EpisodeRow:
         success: strict check. `weak_success`: REFLECT's own. `failures`: what failed, in words.
         harmed: what must never have happened and did, in words (irreversible).
         harmed_s: simulated time of the first such thing, None without.
-        end: why the run ended; "error" with `error` in words.
+        end: why the run ended; "error" and "held" with `error` in words: something broke, or did
+            not answer in time, was not to be believed, went wrong too often in a row.
         steps: length of the starting plan.
         executed: how many subtasks were executed. `refused`: how many of them were refused.
         judged: in order.
@@ -100,6 +101,7 @@ class EpisodeRow:
             language models.
         simulated_s: robot time.
         compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
+        not_judged: moments before a subtask of which the monitor said that nothing was judged.
         implied: whether it was not executed: its detector never alarms on what the unmonitored run
             shows, so that the run is that one.
         provenance: configuration, versions, demonstrations.
@@ -137,6 +139,7 @@ class EpisodeRow:
     compute_s: dict[str, float] = field(hash=False)
     reasoning_s: float = 0.0
     implied: bool = False
+    not_judged: int = 0
     provenance: dict[str, Any] = field(default_factory=dict, hash=False)
 
     @property

@@ -61,7 +61,7 @@ DIGITS = 9
 
 FAILING_SETS = ("robofail", "irreversible")
 
-OUTCOMES = ("success", "weak_success", "prevented", "errors", "stopped", "replanned")
+OUTCOMES = ("success", "weak_success", "prevented", "errors", "stopped", "held", "replanned")
 """What is said of strategies by kind, task and knowability."""
 
 Metrics = dict[str, Metric]

@@ -80,6 +80,8 @@ _RUNS: Columns = (
     ("model calls", "model_calls", mean),
     ("broke off", "errors", share),
     ("stopped safely", "stopped", share),
+    ("held", "held", share),
+    ("moments not judged", "not_judged", mean),
 )
 _TIMES: Columns = (
     ("robot time", "simulated_s", seconds),

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from forestall.domain.model import Domain
 from forestall.seams import PlanValidator, Replanner
+from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
@@ -60,8 +61,8 @@ class Intervention:
     """
 
     def __init__(self, replanner: Replanner, validator: PlanValidator, max_attempts: int) -> None:
-        self._replanner = replanner
-        self._validator = validator
+        self._replanner = AskedReplanner(replanner)
+        self._validator = AskedValidator(validator)
         self._max_attempts = max_attempts
         self._resume_left = 0
         self._attempts: dict[tuple[Literal, ...], int] = {}

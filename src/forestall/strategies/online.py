@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked, look_again
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import Literal
@@ -63,9 +64,9 @@ class Online:
         *,
         inherited: bool = False,
     ) -> None:
-        self._retriever = retriever
-        self._detector = detector
-        self._reasoner = reasoner
+        self._retriever = AskedRetriever(retriever)
+        self._detector = AskedDetector(detector)
+        self._reasoner = AskedReasoner(reasoner)
         self._intervention = Intervention(replanner, validator, max_attempts)
         self._scope = scope
         self._inherited = inherited

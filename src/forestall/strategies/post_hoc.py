@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock, Intervention, look_again
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
@@ -59,9 +60,9 @@ class PostHoc:
         validator: PlanValidator,
         max_attempts: int = 1,
     ) -> None:
-        self._retriever = retriever
-        self._detector = detector
-        self._reasoner = reasoner
+        self._retriever = AskedRetriever(retriever)
+        self._detector = AskedDetector(detector)
+        self._reasoner = AskedReasoner(reasoner)
         self._intervention = Intervention(replanner, validator, max_attempts)
         self._max_attempts = max_attempts
         self._summary = _Summary()

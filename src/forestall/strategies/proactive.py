@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Plan, Subtask
@@ -48,9 +49,9 @@ class Proactive:
         max_attempts: int = 2,
         repeats: bool = False,
     ) -> None:
-        self._retriever = retriever
-        self._detector = detector
-        self._reasoner = reasoner
+        self._retriever = AskedRetriever(retriever)
+        self._detector = AskedDetector(detector)
+        self._reasoner = AskedReasoner(reasoner)
         self._intervention = Intervention(replanner, validator, max_attempts)
         self._repeats = repeats
         self._max_attempts = max_attempts

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from forestall.errors import InputError
 from forestall.seams import Detector, Reasoner, Retriever
+from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock
 from forestall.types.episode import SkillOutcome
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
@@ -48,9 +49,9 @@ class Watch:
         twice = sorted(n for n, count in Counter(d.name for d in detectors).items() if count > 1)
         if twice:
             raise InputError(f"several detectors are called {', '.join(twice)}")
-        self._retriever = retriever
-        self._primary, *self._others = detectors
-        self._reasoner = reasoner
+        self._retriever = AskedRetriever(retriever)
+        self._primary, *self._others = (AskedDetector(d) for d in detectors)
+        self._reasoner = AskedReasoner(reasoner)
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Let every detector judge; on an alarm of the primary one, diagnose; go on."""

@@ -102,6 +102,10 @@ class FaultyEnvironment:
             self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
         return outcome
 
+    def hold(self) -> None:
+        """As the wrapped environment."""
+        self._inner.hold()
+
     def _lets_go(self, subtask: Subtask) -> bool:
         """Whether a skill puts what the hand holds somewhere."""
         skill, containing = self._domain.skill(subtask.skill), self._domain.containing

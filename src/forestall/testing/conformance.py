@@ -8,6 +8,7 @@ list is a pass.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from threading import Thread
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
 
 NONSENSE = "NoSuchThing"
+
+HOLD_S = 5.0
+"""How long `hold` may take."""
 
 
 def check_environment(
@@ -34,7 +38,7 @@ def check_environment(
     Returns:
         One sentence for each thing that is wrong: a run that does not repeat to the last bit, time
         that goes backwards or disagrees with reported durations, observations that are not valid,
-        nonsense that is not refused, an exception where a refusal is due.
+        nonsense that is not refused, an exception where a refusal is due, and motion after `hold`.
     """
     first, second = make(), make()
     try:
@@ -44,6 +48,7 @@ def check_environment(
             ),
             *_repeats("two resets", _run(first, seed, subtasks), first, seed, subtasks),
             *_refuses_nonsense(first, seed, domain),
+            *_holds(first, seed, subtasks),
         ]
     finally:
         first.close()
@@ -172,3 +177,56 @@ def _refuses_nonsense(environment: Environment, seed: int, domain: Domain) -> It
             yield f"{subtask} succeeds; it must be refused"
         elif not outcome.reason:
             yield f"{subtask} is refused without a reason"
+
+
+def _holds(environment: Environment, seed: int, subtasks: Sequence[Subtask]) -> Iterator[str]:
+    """Told to hold in the middle of a plan, from another thread, nothing moves before a reset."""
+    environment.reset(seed)
+    half = len(subtasks) // 2
+    for subtask in subtasks[:half]:
+        environment.execute(subtask)
+    before = environment.observe()
+    yield from _told_to_hold(environment)
+    after = environment.observe()
+    if after.gripper.holding != before.gripper.holding:
+        yield f"hold lets go of {before.gripper.holding}"
+    start_s = environment.time_s
+    for subtask in subtasks[half:]:
+        for name in subtask.args:
+            environment.approach(name)
+        outcome = environment.execute(subtask)
+        if outcome.status is not SkillStatus.REFUSED or not outcome.reason:
+            yield f"after hold {subtask} is not refused with a reason"
+    if environment.time_s != start_s:
+        yield f"after hold the robot moves for {environment.time_s - start_s} s"
+    rest = environment.scan()
+    if rest.robot_position_world_m != before.robot_position_world_m:
+        yield "after hold the robot drives"
+    if rest.gripper != after.gripper:
+        yield "after hold the hand moves"
+    environment.reset(seed)
+    fresh = [environment.execute(s).status for s in subtasks[:1]]
+    environment.reset(seed)
+    if fresh != [environment.execute(s).status for s in subtasks[:1]]:
+        yield "after hold it takes more than one reset until the robot acts again"
+
+
+def _told_to_hold(environment: Environment) -> Iterator[str]:
+    """Twice, from another thread."""
+    failed: list[Exception] = []
+
+    def told() -> None:
+        try:
+            environment.hold()
+        except Exception as error:  # noqa: BLE001  (that nothing is raised is what is checked)
+            failed.append(error)
+
+    for _ in range(2):
+        thread = Thread(target=told, daemon=True)
+        thread.start()
+        thread.join(HOLD_S)
+        if thread.is_alive():
+            yield f"hold does not come back within {HOLD_S:g} s"
+            return
+    for error in failed:
+        yield f"hold raises {error!r}"

@@ -30,6 +30,7 @@ SKILL_S = 5.0
 """How long a skill takes of which the domain does not say it."""
 
 LOOK_S = 1.0
+HOLDS = "the robot was told to hold"
 _APART_M = 1.5
 _HALF_M = 0.05
 
@@ -61,6 +62,7 @@ class SymbolicWorld:
         self._robot: Vec3 = (0.0, 0.0, 0.0)
         self._released: tuple[str, Vec3] | None = None
         self._time_s = 0.0
+        self._holding = False
         self._events: list[Event] = []
 
     @property
@@ -81,7 +83,7 @@ class SymbolicWorld:
     def approach(self, name: str) -> float:
         """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
         found = self._state.matches(name)
-        if not found or found[0] == self._state.held:
+        if self._holding or not found or found[0] == self._state.held:
             return 0.0
         self._state.at = found[0]
         return self._drive(found[0])
@@ -89,6 +91,8 @@ class SymbolicWorld:
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; refuse with a reason when its needs are not met."""
         started = self._time_s
+        if self._holding:
+            return SkillOutcome(SkillStatus.REFUSED, 0.0, HOLDS)
         args = resolve(self._state, subtask)
         if isinstance(args, Refusal):
             return SkillOutcome(SkillStatus.REFUSED, 0.0, args.reason)
@@ -106,8 +110,12 @@ class SymbolicWorld:
         hand = None if self._released is None else self._released[1]
         return SkillOutcome(SkillStatus.SUCCEEDED, self._time_s - started, hand_world_m=hand)
 
+    def hold(self) -> None:
+        """Nothing moves again before `reset`."""
+        self._holding = True
+
     def close(self) -> None:
-        """Nothing is held."""
+        """There is nothing to free."""
 
     # --- OracleView ------------------------------------------------------------------------------
 

@@ -32,6 +32,7 @@ class Hold(Enum):
     ALARM = "alarm without an answer"  # unexplained, or without a plan, or repaired too often
     SENSES = "senses not to be trusted"  # the observation cannot be what the robot sees
     INTERNAL = "something of ours failed"  # a part raised an error or did not answer in time
+    TOO_MANY = "too many in a row"  # alarms, new plans, or subtasks that failed
     REPLAN_LIMIT = "replan limit"
     SUBTASK_LIMIT = "subtask limit"
 

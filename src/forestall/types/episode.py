@@ -110,13 +110,42 @@ class EpisodeEnd(Enum):
     SUBTASK_LIMIT = "subtask limit"
     REPLAN_LIMIT = "replan limit"  # a further plan was asked for than may be adopted
     STOPPED = "stopped safely"
-    ERROR = "error"
+    HELD = "held"  # something of ours failed, was late or went wrong too often; see `trouble`
+    ERROR = "error"  # the world failed
     UNFINISHED = "unfinished"  # the record breaks off: the run was killed, or is not over
+
+
+class TroubleKind(Enum):
+    """What sort of thing went wrong inside a run."""
+
+    LATE = "did not answer in time"
+    INTERNAL = "internal error"  # a mistake in a program of ours, or in somebody's part
+    FAILED = "failed"  # a part said what is wrong
+    WORLD = "the world failed"
+    SENSES = "senses not to be trusted"
+    TOO_MANY = "too many in a row"
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """Why a run was held or broke off: which part, what it did, in words.
+
+    `trace` is where in the program an internal error came up, for whoever mends it.
+    """
+
+    kind: TroubleKind
+    part: str
+    text: str
+    trace: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeRecord:
-    """The record of one run."""
+    """The record of one run.
+
+    `notes` say what else befell it: whether the robot could be told to hold, listeners that failed
+    or were late, a scorer that failed.
+    """
 
     task: Task
     scenario: str | None
@@ -135,3 +164,5 @@ class EpisodeRecord:
     compute_s: tuple[tuple[str, float], ...] = ()
     final: SceneGraph | None = None  # everything known after the last subtask, if anybody looked
     provenance: tuple[tuple[str, Any], ...] = field(default=(), hash=False)
+    trouble: Trouble | None = None
+    notes: tuple[str, ...] = ()

@@ -19,7 +19,7 @@ from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.domain.model import Domain
 from forestall.errors import ForestallError, SceneError
 from forestall.seams import Renderer, World
-from forestall.types.episode import Event, SkillOutcome
+from forestall.types.episode import Event, SkillOutcome, SkillStatus
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
@@ -47,6 +47,8 @@ ONE_VIEW_RAD = math.radians(17.0)
 """Directions this near to a group's middle are looked at in one frame."""
 
 AHEAD_TILT_RAD = math.radians(15.0)
+
+HOLDS = "the robot was told to hold"
 
 
 class Stage(World, Protocol):
@@ -154,6 +156,7 @@ class KitchenEnvironment:
         self._make = make or _maker(renderer, frames)
         self._seed: int | None = None
         self._released: tuple[str, Vec3] | None = None
+        self._holding = False
         self._world: Stage | None = None
         self._renderer: Renderer | None = None
         self._robot: Robot | None = None
@@ -171,13 +174,18 @@ class KitchenEnvironment:
             self._seed = seed
         else:
             self._world.reset()
-        self._released = None
+        self._released, self._holding = None, False
         household = Household(self._catalogue, self._world, self._world.instances)
         self._robot = Robot(household, self._times)
         effects.settle(household, self._effect_config)
 
     def scan(self, thorough: bool = False) -> Observation:
-        """Views all around: the base turns once on the spot, which takes its time."""
+        """Views all around: the base turns once on the spot, which takes its time.
+
+        A robot that was told to hold only looks ahead.
+        """
+        if self._holding:
+            return self.observe()
         world, household = self._stage, self._acting.household
         start_rad = world.robot_yaw_rad
         frames = []
@@ -203,7 +211,8 @@ class KitchenEnvironment:
         frames = []
         for aim in _aims(np.asarray(focus, dtype=float) - eye):
             heading = math.atan2(aim[1], aim[0])
-            if abs(_wrapped(heading - world.robot_yaw_rad)) > NECK_RAD:
+            far = abs(_wrapped(heading - world.robot_yaw_rad)) > NECK_RAD
+            if far and not self._holding:
                 self._acting.household.time_s += world.turn_to(heading)
             frames.append(self._frame(world.look_at((eye + aim).tolist())))
         return self._observation(frames)
@@ -212,13 +221,15 @@ class KitchenEnvironment:
         """Drive to where a thing can be reached, unless it is within reach; simulated seconds."""
         household = self._acting.household
         start_s = household.time_s
-        if household.exists(name):
+        if household.exists(name) and not self._holding:
             with suppress(RefusalError):
                 self._acting.approach(name)
         return household.time_s - start_s
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""
+        if self._holding:
+            return SkillOutcome(SkillStatus.REFUSED, 0.0, HOLDS)
         effects.settle(self._acting.household, self._effect_config)
         held = self._acting.household.held
         outcome = perform(self._acting, subtask)
@@ -229,6 +240,10 @@ class KitchenEnvironment:
             self._released = None if where is None else (held, where)
             outcome = replace(outcome, hand_world_m=where)
         return outcome
+
+    def hold(self) -> None:
+        """Nothing that the robot does moves anything again before `reset`."""
+        self._holding = True
 
     def drop_held(self, hard: bool = False) -> str | None:
         """Let go of the held object where the robot is; its name, None when nothing fell.

@@ -1,0 +1,95 @@
+"""What the memory of a scene lets go: one thing under two names, things long lost, things too many.
+
+Called by `fuse.py` on all that is remembered. A tracker that gives the same things new names at
+every look would else fill the memory with things that are nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from forestall.perception.config import PerceptionConfig
+from forestall.perception.tracks import Track
+from forestall.types.graph import Seen
+
+Tracks = dict[str, Track]
+
+
+def remove(tracks: Tracks, name: str, heir: str | None = None) -> None:
+    """Take a thing out; what rests in or on it then rests in or on `heir`."""
+    del tracks[name]
+    for child in tracks.values():
+        if child.parent is not None and child.parent[1] == name:
+            child.parent = None if heir is None else (child.parent[0], heir)
+
+
+def merge_renamed(
+    tracks: Tracks,
+    gone: Collection[str],
+    fresh: Collection[str],
+    config: PerceptionConfig,
+) -> None:
+    """Where a thing was and is not seen, a new one of its category stands: it has another name now.
+
+    Two cannot be at one place. The new name stays, since it is the one that whoever gave it knows;
+    what is known of the old one's states goes with it.
+
+    Args:
+        tracks: by name.
+        gone: located before, and not seen now.
+        fresh: seen now for the first time.
+        config: how much of the smaller box both must share.
+    """
+    for old in sorted(gone):
+        alike = [n for n in sorted(fresh) if tracks[n].category == tracks[old].category]
+        shares = {n: _shared(tracks[old], tracks[n]) for n in alike}
+        new = max(alike, key=lambda n: shares[n], default=None)
+        if new is not None and shares[new] >= config.same_share:
+            known = {a: v for a, v in tracks[old].states.items() if v is not None}
+            tracks[new].states = {**known, **tracks[new].states}
+            tracks[new].interior_seen |= tracks[old].interior_seen
+            remove(tracks, old, new)
+
+
+def let_go(tracks: Tracks, kept: Collection[str], config: PerceptionConfig) -> tuple[str, ...]:
+    """Of each category all but a few lost things, and what is over the budget.
+
+    Args:
+        tracks: by name.
+        kept: what is seen, held, or was just moved.
+        config: how many are remembered.
+
+    Returns:
+        What there was no room for any more: unlocated things first, then unobserved ones, those
+        that were seen longest ago first.
+    """
+    lost: dict[str, list[Track]] = {}
+    for name, track in tracks.items():
+        if track.points_world_m is None and name not in kept:
+            lost.setdefault(track.category, []).append(track)
+    for some in lost.values():
+        newest = sorted(some, key=lambda t: (-t.last_seen_s, t.id))
+        for track in newest[config.max_lost :]:
+            remove(tracks, track.id)
+    may_go = sorted((t for n, t in tracks.items() if n not in kept), key=_order)
+    over = may_go[: max(0, len(tracks) - config.max_things)]
+    for track in over:
+        remove(tracks, track.id)
+    return tuple(t.id for t in over)
+
+
+def _order(track: Track) -> tuple[bool, bool, float, str]:
+    located = track.points_world_m is not None
+    return (located, track.seen is not Seen.UNOBSERVED, track.last_seen_s, track.id)
+
+
+def _shared(one: Track, other: Track) -> float:
+    """The volume that two boxes share, as a share of the smaller one's."""
+    if one.points_world_m is None or other.points_world_m is None:
+        return 0.0
+    low, high = np.maximum(one.low_m, other.low_m), np.minimum(one.high_m, other.high_m)
+    both = float(np.prod(np.maximum(high - low, 0.0)))
+    volumes = [float(np.prod(np.maximum(t.high_m - t.low_m, 1e-4))) for t in (one, other)]
+    return both / min(volumes)
