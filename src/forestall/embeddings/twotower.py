@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -94,12 +94,10 @@ class Description:
 
 
 def _reading(field: Field) -> StateReading:
-    temperature, threshold = (
-        dict(field.optional(key, lambda f: f.pairs(Field.number)) or ())
-        for key in ("temperature", "threshold")
-    )
-    found = StateReading(field["scale"].number(), temperature, threshold)
-    least_area = field.optional("least_area", Field.whole)
+    scale, *by_attribute, area = (f.name for f in fields(StateReading))
+    numbers = [dict(field.optional(k, lambda f: f.pairs(Field.number)) or ()) for k in by_attribute]
+    found = StateReading(field[scale].number(), *numbers)
+    least_area = field.optional(area, Field.whole)
     return found if least_area is None else replace(found, least_area=least_area)
 
 
