@@ -21,11 +21,17 @@ if TYPE_CHECKING:
     from forestall.domain.model import Domain as Domain
     from forestall.errors import ForestallError as ForestallError
     from forestall.errors import InputError as InputError
+    from forestall.errors import ObservationError as ObservationError
     from forestall.errors import PartError as PartError
     from forestall.learning.learn import Learnt as Learnt
     from forestall.learning.learn import learn as learn
     from forestall.memory.store import SqliteStore as Memory
     from forestall.memory.store import open_store as open_memory
+    from forestall.perception.scenes import Conventions as Conventions
+    from forestall.perception.scenes import Found as Found
+    from forestall.perception.scenes import Hand as Hand
+    from forestall.perception.scenes import Picture as Picture
+    from forestall.perception.scenes import Scenes as Scenes
     from forestall.supervision import Limits as Limits
     from forestall.types.decision import Hold as Hold
     from forestall.types.decision import MonitorDecision as MonitorDecision
@@ -37,6 +43,7 @@ if TYPE_CHECKING:
     from forestall.types.episode import SkillStatus as SkillStatus
     from forestall.types.facts import Literal as Literal
     from forestall.types.facts import Truth as Truth
+    from forestall.types.finding import Finding as Finding
     from forestall.types.graph import Box as Box
     from forestall.types.graph import ObjectNode as ObjectNode
     from forestall.types.graph import Relation as Relation
@@ -59,16 +66,20 @@ __version__ = "0.1.0"
 
 _PUBLIC = {
     "Box": "types.graph",
+    "Conventions": "perception.scenes",
     "Demonstration": "types.demonstration",
     "DemonstrationStep": "types.demonstration",
     "Detection": "types.observation",
     "Diagnosis": "types.verdict",
     "Domain": "domain.model",
     "ExecutedRecord": "types.episode",
+    "Finding": "types.finding",
     "ForestallError": "errors",
+    "Found": "perception.scenes",
     "Frame": "types.observation",
     "Goal": "types.task",
     "GripperState": "types.observation",
+    "Hand": "perception.scenes",
     "Hold": "types.decision",
     "InputError": "errors",
     "Intrinsics": "types.observation",
@@ -81,11 +92,14 @@ _PUBLIC = {
     "MonitorDecision": "types.decision",
     "ObjectNode": "types.graph",
     "Observation": "types.observation",
+    "ObservationError": "errors",
     "Outcome": "types.decision",
     "PartError": "errors",
+    "Picture": "perception.scenes",
     "Plan": "types.plan",
     "Relation": "types.graph",
     "SceneGraph": "types.graph",
+    "Scenes": "perception.scenes",
     "Seen": "types.graph",
     "SkillOutcome": "types.episode",
     "SkillStatus": "types.episode",
@@ -102,16 +116,20 @@ _PUBLIC = {
 
 __all__ = [
     "Box",
+    "Conventions",
     "Demonstration",
     "DemonstrationStep",
     "Detection",
     "Diagnosis",
     "Domain",
     "ExecutedRecord",
+    "Finding",
     "ForestallError",
+    "Found",
     "Frame",
     "Goal",
     "GripperState",
+    "Hand",
     "Hold",
     "InputError",
     "Intrinsics",
@@ -124,11 +142,14 @@ __all__ = [
     "MonitorDecision",
     "ObjectNode",
     "Observation",
+    "ObservationError",
     "Outcome",
     "PartError",
+    "Picture",
     "Plan",
     "Relation",
     "SceneGraph",
+    "Scenes",
     "Seen",
     "SkillOutcome",
     "SkillStatus",

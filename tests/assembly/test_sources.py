@@ -82,9 +82,9 @@ def test_files_that_show_none(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="there is no such file"):
         demonstrations_from(tmp_path / "gone.db")
     for name, text, said in (
-        ("a.json", "{", "cannot read demonstration"),
+        ("a.json", "{", "damaged or truncated"),
         ("b.json", '{"nodes": []}', "neither a demonstration"),
-        ("c.json", '{"steps": [{"subtask": "x(y)", "scene": "../c.json"}]}', "outside the folder"),
+        ("c.json", '{"steps": [{"subtask": "x(y)", "scene": "../c.json"}]}', "is no file inside the folder"),
         ("d.txt", "", "files may be"),
     ):
         (tmp_path / name).write_text(text)

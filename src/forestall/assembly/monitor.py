@@ -5,7 +5,7 @@ Called by users; calls `sources`, `learning` and the registry's parts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,18 @@ from forestall.assembly.parts import Assembly
 from forestall.assembly.sources import Source, demonstrations_from
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
+from forestall.domain.words import Words
 from forestall.kinds import DOMAIN, LIMIT, PERCEIVER, STRATEGY
 from forestall.learning.learn import learn
 from forestall.monitor import Monitor as RunMonitor
+from forestall.monitor import Scene
+from forestall.perception.scene_dict import scene_from_dict
+from forestall.perception.scenes import Scenes
+from forestall.types.decision import MonitorDecision
 from forestall.types.demonstration import Demonstration
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+from forestall.types.plan import Subtask
 
 DEFAULTS = Given.named(
     {
@@ -32,6 +40,10 @@ needs no scene of the same kind; masks and states are those that an observation 
 robot says was not done is done again."""
 
 
+PICTURES = frozenset(("rgb", "frames"))
+"""What a scene in plain data has if it is a picture."""
+
+
 class Monitor(RunMonitor):
     """Says before each subtask whether it may start; see `forestall.monitor` for a run.
 
@@ -41,6 +53,8 @@ class Monitor(RunMonitor):
         limits: what cannot be judged or done, a sentence each; none where a domain was given.
     """
 
+    _scenes: Scenes
+    _words: Words
     domain: Domain
     demonstrations: tuple[Demonstration, ...]
     limits: tuple[str, ...]
@@ -93,9 +107,27 @@ class Monitor(RunMonitor):
             None if domain is None else parts.part(PERCEIVER),
             config or MonitorConfig(limits=parts.part(LIMIT)),
         )
+        monitor._scenes, monitor._words = Scenes(own), Words(own)
         monitor.domain, monitor.limits = own, limits
         monitor.demonstrations = tuple(demonstrations)
         return monitor
+
+    def check(self, scene: Scene, subtask: Subtask | str) -> MonitorDecision:
+        """May this one subtask start in this scene? See `forestall.monitor.Monitor.check`.
+
+        Of a picture the subtask may speak as its detections do: "pick_up(coffee mug)".
+        """
+        seen = self._read(scene)
+        wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
+        if isinstance(seen, Observation):
+            wanted = self._words.subtask(wanted)
+        return super().check(seen, wanted)
+
+    def _read(self, scene: Scene) -> Observation | SceneGraph:
+        """Also pictures as plain data (`perception.scene_dict`)."""
+        if isinstance(scene, Mapping) and PICTURES & scene.keys():
+            scene = scene_from_dict(self._scenes, scene)
+        return super()._read(scene)
 
 
 def _domain(said: Domain | str | Path) -> Domain:

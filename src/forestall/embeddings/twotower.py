@@ -94,9 +94,11 @@ class Description:
 
 
 def _reading(field: Field) -> StateReading:
-    scale, *by_attribute, area = (f.name for f in fields(StateReading))
-    numbers = [dict(field.optional(k, lambda f: f.pairs(Field.number)) or ()) for k in by_attribute]
-    found = StateReading(field[scale].number(), *numbers)
+    scale, divisor, least, area = (f.name for f in fields(StateReading))
+    found = StateReading(
+        field[scale].number(),
+        *(dict(field.optional(k, lambda f: f.pairs(Field.number)) or ()) for k in (divisor, least)),  # type: ignore[arg-type]
+    )
     least_area = field.optional(area, Field.whole)
     return found if least_area is None else replace(found, least_area=least_area)
 
