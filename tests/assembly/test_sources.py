@@ -84,7 +84,11 @@ def test_files_that_show_none(tmp_path: Path) -> None:
     for name, text, said in (
         ("a.json", "{", "damaged or truncated"),
         ("b.json", '{"nodes": []}', "neither a demonstration"),
-        ("c.json", '{"steps": [{"subtask": "x(y)", "scene": "../c.json"}]}', "is no file inside the folder"),
+        (
+            "c.json",
+            '{"steps": [{"subtask": "x(y)", "scene": "../c.json"}]}',
+            "is no file inside",
+        ),
         ("d.txt", "", "files may be"),
     ):
         (tmp_path / name).write_text(text)

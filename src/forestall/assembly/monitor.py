@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Choice, Given, choices, domain_of
+from forestall.assembly.eyes import Eyes, is_picture
 from forestall.assembly.parts import Assembly
 from forestall.assembly.sources import Source, demonstrations_from
 from forestall.conclusion import MonitorConfig
@@ -38,10 +39,6 @@ DEFAULTS = Given.named(
 """What a monitor of somebody's own has where nothing is said: it judges by what always held, which
 needs no scene of the same kind; masks and states are those that an observation brings; what the
 robot says was not done is done again."""
-
-
-PICTURES = frozenset(("rgb", "frames"))
-"""What a scene in plain data has if it is a picture."""
 
 
 class Monitor(RunMonitor):
@@ -73,7 +70,7 @@ class Monitor(RunMonitor):
 
         Args:
             source: a memory file, folders of runs, graphs, lists of (subtask, scene), or a mixture;
-                see `assembly.sources`.
+                see `assembly.sources`. With a domain scenes may be pictures.
             domain: a domain, its name, or a file of one. Without it skills, relations and
                 attributes are those that the demonstrations use, what always held before a skill
                 is needed, what always changed is what it does; `limits` says what that leaves out.
@@ -88,15 +85,17 @@ class Monitor(RunMonitor):
         Raises:
             InputError: a source, a name or an option that is not valid; says what would be.
         """
-        demonstrations = demonstrations_from(source)
+        given: Given = options.pop("given", Given())
+        said = Given.named(options).over(given).over(DEFAULTS)
         limits: tuple[str, ...] = ()
         if domain is None:
+            demonstrations = demonstrations_from(source)
             learnt = learn(demonstrations, hands=hands)
             own, limits = learnt.domain, learnt.limits
         else:
-            own = _domain(domain)
-        given: Given = options.pop("given", Given())
-        said = Given.named(options).over(given).over(DEFAULTS)
+            own, told = _domain(domain), dict[str, Mapping[str, str]]()
+            seeing = Assembly(choices(said), own, None, {"states": told})
+            demonstrations = demonstrations_from(source, Eyes(seeing.part(PERCEIVER), own, told))
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
@@ -125,7 +124,7 @@ class Monitor(RunMonitor):
 
     def _read(self, scene: Scene) -> Observation | SceneGraph:
         """Also pictures as plain data (`perception.scene_dict`)."""
-        if isinstance(scene, Mapping) and PICTURES & scene.keys():
+        if isinstance(scene, Mapping) and is_picture(scene):
             scene = scene_from_dict(self._scenes, scene)
         return super()._read(scene)
 

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import forestall
+from forestall.assembly.eyes import Eyes, is_picture
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.memory.codec import encode
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
+from forestall.perception.folder import OBSERVATION_FILE
 from forestall.reading.documents import read_json
 from forestall.reading.files import inside
 from forestall.records.record import read_record
@@ -39,13 +41,14 @@ Source = Any
 """A path, a `Demonstration`, a list of steps, or an iterable of these."""
 
 
-def demonstrations_from(source: Source) -> list[Demonstration]:
+def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demonstration]:
     """Every demonstration of a source.
 
     Args:
         source: a memory file; the folder of a run; a JSON file of a demonstration that somebody
             wrote (`written`), or of one graph with its subtask; a folder of any of these; a
             `Demonstration`; a list of steps; or an iterable of all that.
+        eyes: see scenes that are pictures; without them these are refused.
 
     Returns:
         Demonstrations with ids that differ, in the order of the source.
@@ -54,13 +57,13 @@ def demonstrations_from(source: Source) -> list[Demonstration]:
         InputError: something that is no demonstration, with its place.
         MemoryFileError: see `memory.store`.
     """
-    found = _from(source)
+    found = _from(source, eyes)
     if not found:
         raise InputError(f"no demonstration was found in {_said(source)}")
     return _named(found)
 
 
-def written(data: Any, folder: Path | None = None) -> Demonstration:
+def written(data: Any, folder: Path | None = None, eyes: Eyes | None = None) -> Demonstration:
     """A demonstration as somebody wrote it.
 
     Args:
@@ -68,6 +71,8 @@ def written(data: Any, folder: Path | None = None) -> Demonstration:
             its short form or in JSON, or the name of a file with one. Or a list of
             (subtask, scene), behind which may stand the scene after the last one.
         folder: where files are looked for; None: scenes are not in files.
+        eyes: see scenes that are pictures: an observation, one in plain data, or the name of the
+            folder of a stored one.
 
     Raises:
         InputError: what cannot be read, with the number of the step.
@@ -90,13 +95,16 @@ def written(data: Any, folder: Path | None = None) -> Demonstration:
     if not pairs:
         raise InputError("a demonstration needs one step at least")
     made = []
+    seen = any(is_picture(given) or _is_folder(given, folder) for _, given in pairs)
+    if seen and eyes is not None:
+        eyes.begin()
     for number, (subtask, given) in enumerate(pairs, 1):
         try:
-            graph = _scene(given, folder)
-            made.append(_step(number - 1, subtask, graph))
+            graph = _scene(given, folder, eyes)
+            made.append(_step(number - 1, subtask, graph, eyes if seen else None))
         except InputError as error:
             raise InputError(f"step {number}: {error}") from error
-    last = None if final is None else _scene(final, folder)
+    last = None if final is None else _scene(final, folder, eyes)
     return Demonstration(task, scene, 0, tuple(made), version=forestall.__version__, final=last)
 
 
@@ -130,7 +138,7 @@ def labelled(
             given["relations"].append((fact.args[0], fact.predicate, fact.args[1]))
     graph = scene_graph(given)
     if scene is not None:
-        graph = _over(graph, _scene(scene.name, scene.parent))
+        graph = _over(graph, _scene(scene.name, scene.parent, None))
     if not graph.nodes:
         raise InputError("a label says nothing: give a scene, or a fact")
     steps = [{"subtask": subtask, "scene": graph}]
@@ -154,18 +162,18 @@ def _over(said: SceneGraph, seen: SceneGraph) -> SceneGraph:
     )
 
 
-def _from(source: Source) -> list[Demonstration]:
+def _from(source: Source, eyes: Eyes | None) -> list[Demonstration]:
     if isinstance(source, Demonstration):
         return [source]
     if isinstance(source, str | Path):
-        return _from_path(Path(source))
+        return _from_path(Path(source), eyes)
     if isinstance(source, Mapping) or _is_steps(source):
-        return [written(source)]
+        return [written(source, None, eyes)]
     if isinstance(source, Iterable):
         found = []
         for number, part in enumerate(source, 1):
             try:
-                found += _from(part)
+                found += _from(part, eyes)
             except InputError as error:
                 raise InputError(f"demonstration {number}: {error}") from error
         return found
@@ -175,14 +183,14 @@ def _from(source: Source) -> list[Demonstration]:
     )
 
 
-def _from_path(path: Path) -> list[Demonstration]:
+def _from_path(path: Path, eyes: Eyes | None) -> list[Demonstration]:
     if not path.exists():
         raise FileFormatError(f"{path}: there is no such file or folder")
     if path.is_file() and path.suffix in MEMORY_SUFFIXES:
         with open_store(path) as store:
             return list(store.required())
     if path.is_file() and path.suffix == ".json" and path.name not in RECORD_FILES:
-        return [_from_json(path)]
+        return [_from_json(path, eyes)]
     if path.name in RECORD_FILES or any((path / name).is_file() for name in RECORD_FILES):
         found = demonstration_from(read_record(path), forestall.__version__)
         if found is None:
@@ -193,7 +201,10 @@ def _from_path(path: Path) -> list[Demonstration]:
         return [found]
     if path.is_dir():
         return [
-            d for inside in sorted(path.iterdir()) if _shows(inside) for d in _from_path(inside)
+            d
+            for inside in sorted(path.iterdir())
+            if _shows(inside)
+            for d in _from_path(inside, eyes)
         ]
     known = ", ".join((".json", *MEMORY_SUFFIXES))
     raise FileFormatError(f"{path} shows no demonstration: files may be {known}")
@@ -206,11 +217,11 @@ def _shows(path: Path) -> bool:
     return path.suffix in (".json", *MEMORY_SUFFIXES)
 
 
-def _from_json(path: Path) -> Demonstration:
+def _from_json(path: Path, eyes: Eyes | None) -> Demonstration:
     data = read_json(path, "demonstration")
     try:
         if isinstance(data, dict) and "steps" in data:
-            return written(data, path.parent)
+            return written(data, path.parent, eyes)
         if isinstance(data, dict) and data.get("subtask"):
             graph = scene_graph(data)
             assert graph.subtask is not None, "its text is not empty"
@@ -218,6 +229,10 @@ def _from_json(path: Path) -> Demonstration:
         raise InputError("neither a demonstration with 'steps' nor a graph with its 'subtask'")
     except ForestallError as error:
         raise FileFormatError(f"{path}: {error}") from error
+
+
+def _is_folder(given: Any, folder: Path | None) -> bool:
+    return isinstance(given, str) and folder is not None and (folder / given).is_dir()
 
 
 def _is_pair(step: Any) -> bool:
@@ -245,24 +260,37 @@ def _pair(number: int, step: Any) -> tuple[Subtask, Any]:
         raise InputError(f"step {number}: {error}") from error
 
 
-def _scene(given: Any, folder: Path | None) -> SceneGraph:
-    if not isinstance(given, str):
+def _scene(given: Any, folder: Path | None, eyes: Eyes | None) -> SceneGraph:
+    if isinstance(given, str):
+        if folder is None:
+            raise InputError(f"the scene {given!r} is a name: give the scene itself")
+        if not (folder / given).is_dir():
+            return scene_graph(read_json(inside(folder, given), "scene"))
+        given = inside(folder, f"{given}/{OBSERVATION_FILE}").parent
+    if not isinstance(given, Path) and not is_picture(given):
         return scene_graph(given)
-    if folder is None:
-        raise InputError(f"the scene {given!r} is a name: give the scene itself")
-    return scene_graph(read_json(inside(folder, given), "scene"))
+    if eyes is None:
+        raise InputError("a picture needs a domain to be seen in: give one, or a scene graph")
+    return eyes.see(given)
 
 
-def _step(index: int, subtask: Subtask, graph: SceneGraph) -> DemonstrationStep:
-    """A step whose arguments are the graph's own nodes, where a name can mean one only."""
-    names = []
+def _step(
+    index: int, subtask: Subtask, graph: SceneGraph, eyes: Eyes | None = None
+) -> DemonstrationStep:
+    """A step whose arguments are the graph's own nodes, where a name can mean one only.
+
+    Of what was seen the monitor's own rules say which one is meant.
+    """
+    whole, names = replace(graph, subtask=None), []
+    if eyes is not None:
+        ground, scoped = eyes.step(subtask, graph)
+        return DemonstrationStep(index, ground, scoped, whole)
     for name in subtask.args:
         fitting = graph.matches(name)
         if len(fitting) > 1 and not is_instance(name):
             raise InputError(f"{name!r} of {subtask} can be {' or '.join(fitting)}: name one")
         names.append(fitting[0] if fitting else name)
     ground = replace(subtask, args=tuple(names))
-    whole = replace(graph, subtask=None)
     return DemonstrationStep(index, ground, replace(graph, subtask=ground), whole)
 
 
