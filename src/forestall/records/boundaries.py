@@ -132,6 +132,7 @@ def _observation_json(observation: StoredObservation) -> dict[str, Any]:
         "hand_world_m": gripper.position_world_m,
         "released": gripper.released,
         "released_world_m": gripper.released_world_m,
+        **({} if gripper.width_m is None else {"width_m": gripper.width_m}),
         "robot_position_world_m": observation.robot_position_world_m,
         "cameras": [
             {
@@ -157,6 +158,7 @@ def _observation_from(field: Field) -> StoredObservation:
             position_world_m=field["hand_world_m"].vector(),
             released=field.maybe("released", Field.text),
             released_world_m=field.maybe("released_world_m", Field.vector),
+            width_m=field["width_m"].number() if "width_m" in field.value else None,
         ),
         time_s=field["time_s"].number(),
         robot_position_world_m=field["robot_position_world_m"].vector(),

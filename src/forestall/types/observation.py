@@ -173,6 +173,8 @@ class GripperState:
     purpose, `released_world_m` where: the arm knows it, whether or not the camera sees it.
     `name` is the hand's node in the graph, one of the domain's hands. `told` is False for a robot
     without a hand, or one that does not tell: then nothing is known of what it holds.
+    `width_m` is how far its fingers are apart, None where it does not measure that: `holding` is
+    what the robot meant to take, the width belongs to what it has.
     """
 
     holding: str | None
@@ -181,6 +183,7 @@ class GripperState:
     released_world_m: Vec3 | None = None
     name: str = GRIPPER
     told: bool = True
+    width_m: float | None = None
 
     def __post_init__(self) -> None:
         for what, name in (("holding", self.holding), ("released", self.released)):

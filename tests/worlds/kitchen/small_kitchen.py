@@ -1,6 +1,6 @@
 """A flat kitchen written down in a few words, and a robot to command in it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from forestall.domain.load import shipped
 from forestall.types.episode import SkillOutcome, SkillStatus
@@ -11,6 +11,8 @@ from forestall.types.scene import SceneNeeds
 from forestall.worlds.kitchen.effects import EffectConfig
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import FlatInstance, FlatRenderer, FlatScene, FlatWorld
+from forestall.worlds.kitchen.imperfection import Rates
+from forestall.worlds.kitchen.law import Way
 
 CONTAINING = shipped("household").containing
 FIXTURES = {
@@ -34,6 +36,9 @@ class SmallKitchen:
         spots: Mapping[str, int] | None = None,
         crowded: tuple[str, ...] = (),
         cool_down_s: float = 300.0,
+        rates: Rates | None = None,
+        ways: Sequence[Way] = (),
+        seed: int = 0,
     ) -> None:
         written = [self._parse(t) for t in things]
         names = {i.name for i in written}
@@ -60,8 +65,10 @@ class SmallKitchen:
             effect_config=EffectConfig(cool_down_s=cool_down_s),
             build=lambda needs, seed, catalogue: self.world,
             make=lambda world, intrinsics: FlatRenderer(intrinsics),
+            rates=rates,
+            ways=ways,
         )
-        self.env.reset(0)
+        self.env.reset(seed)
 
     @staticmethod
     def _parse(text: str) -> FlatInstance:
@@ -77,6 +84,10 @@ class SmallKitchen:
             assert outcome.status is SkillStatus.SUCCEEDED, f"{step}: {outcome.reason}"
         return outcome
 
+    def tried(self, step: str) -> SkillOutcome:
+        """Run one step, however it ends."""
+        return self.env.execute(Subtask.parse(step))
+
     def refused(self, step: str) -> str:
         """Run a step that must be refused without any change of the truth; its reason."""
         before = self.env.oracle.truth().text(), self.env.oracle.history()
@@ -90,6 +101,10 @@ class SmallKitchen:
 
     def parent(self, name: str) -> str | None:
         return next(iter(self.env.oracle.truth().parents(name, CONTAINING)), None)
+
+    def told(self, kind: str) -> list[str]:
+        """The words of every event of a kind."""
+        return [e.text for e in self.env.oracle.events() if e.kind == kind]
 
     @property
     def held(self) -> str | None:

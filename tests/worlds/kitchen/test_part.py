@@ -21,7 +21,7 @@ def test_frames_are_remembered_only_where_many_runs_follow(monkeypatch: pytest.M
     made: list[object] = []
     real = KitchenEnvironment
 
-    def environment(*args: object, frames: object) -> object:
+    def environment(*args: object, frames: object, **rest: object) -> object:
         made.append(frames)
         return real(*args)  # type: ignore[arg-type]
 

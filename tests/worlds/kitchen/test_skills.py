@@ -5,7 +5,8 @@ from forestall.domain.load import shipped
 from forestall.errors import SceneError
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Subtask
-from forestall.worlds.kitchen.skills import SKILL_TABLE, SkillTimes
+from forestall.worlds.kitchen.actor import SkillTimes
+from forestall.worlds.kitchen.skills import SKILL_TABLE
 
 
 def test_every_verb_has_a_skill() -> None:

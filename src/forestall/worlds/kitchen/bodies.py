@@ -17,6 +17,7 @@ from forestall.worlds.kitchen.forms import Float, Form, Pose, Rect, Region, Vec,
 from forestall.worlds.kitchen.placement import Occupant, footprint_at
 
 PARKED_Z_M = -6.0
+
 SIGHT_GROUPS = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
 """Geom groups that stop a glance: everything drawn but the robot."""
 
@@ -54,6 +55,7 @@ class Bodies:
         self.parents: dict[str, str | None] = {}
         self._regions: dict[str, int] = {}
         self.states = {name: dict(values) for name, values in states.items()}
+        self._between: set[tuple[str, str]] = set()
         self.present: set[str] = {n for n in forms if n not in compiled.free}
         self._body = {self.model.body(b).name: b for b in range(self.model.nbody)}
         self._instance_geoms: dict[str, list[int]] = {}
@@ -187,22 +189,40 @@ class Bodies:
     def show(self, name: str, attribute: str, value: str) -> None:
         """Set a state and make it visible; unknown pairs are ignored."""
         known = self.states.get(name)
-        if known is None or attribute not in known or known[attribute] == value:
+        if known is None or attribute not in known:
+            return
+        if known[attribute] == value and (name, attribute) not in self._between:
             return
         known[attribute] = value
+        self._between.discard((name, attribute))
         self._apply(name)
-        carried = self._turn(name, attribute)
+        self._move_joints(name, attribute)
+
+    def leave_between(self, name: str, attribute: str, towards: str, share: float) -> None:
+        """Leave the joints of an attribute a share of the way from its state to another value."""
+        if attribute in self.states.get(name, {}):
+            self._between.add((name, attribute))
+            self._move_joints(name, attribute, towards, share)
+
+    def _move_joints(
+        self, name: str, attribute: str, towards: str | None = None, share: float = 0.0
+    ) -> None:
+        carried = self._turn(name, attribute, towards, share)
         self.refresh()
         for thing, body, local in carried:
             self.move(thing, self.pose(body) @ local)
 
-    def _turn(self, name: str, attribute: str) -> list[tuple[str, str, Pose]]:
+    def _turn(
+        self, name: str, attribute: str, towards: str | None = None, share: float = 0.0
+    ) -> list[tuple[str, str, Pose]]:
         """Move the joints of an attribute; what must follow: (thing, body, pose in body)."""
         follow: list[tuple[str, str, Pose]] = []
         for address, body, values in self.compiled.motions.get((name, attribute), ()):
             value = values.get(self.states[name][attribute])
             if value is None:
                 continue
+            if towards is not None:
+                value += share * (values.get(towards, value) - value)
             carrier = self.model.body(body).name
             for k, region in enumerate(self.forms[name].regions):
                 if region.carrier != carrier:
@@ -296,6 +316,7 @@ class Bodies:
         self._regions = dict(snapshot.regions)
         self.states = {name: dict(values) for name, values in snapshot.states.items()}
         self.present = set(snapshot.present)
+        self._between.clear()
         self.refresh()
 
     def place_robot(self, x: float, y: float, yaw_rad: float) -> None:

@@ -45,8 +45,12 @@ def settle(household: Household, config: EffectConfig | None = None) -> None:
         kept: set[str] = set()
         for name in list(household.names()):
             device = household.category(name).device
-            if device is not None and runs(household, name):
+            if device is None:
+                continue
+            if runs(household, name):
                 kept |= _work(household, name, device)
+            else:
+                household.law.rests(name)
         _drift(household, kept, config.cool_down_s)
         if len(household.events()) == before:
             return
@@ -74,24 +78,29 @@ def works_on(household: Household, name: str) -> str:
 
 def _work(household: Household, name: str, device: Device) -> set[str]:
     """One round of one device; returns the things whose temperature it keeps."""
-    target = works_on(household, name)
+    target, law = works_on(household, name), household.law
     contents, within = household.contents(target), household.within(target)
+    law.rests(name, within)
     if device.cleans:
         for thing in contents:
             household.set_state(thing, "dirty", "clean")
+            law.wets(thing, name)
         for food in within:
             kind = household.category(food)
             if kind.food and not kind.washable_food:
                 household.spoil(food, f"{food} was under the running {device.fills or 'water'}")
     if device.fills is not None:
         for thing in contents:
-            _fill(household, thing, device, device.fills)
+            if not household.is_lying(thing) and law.fills(thing, name):
+                _fill(household, thing, device, device.fills)
+    if device.heats or device.cooks:
+        within = [n for n in within if law.heats(n, name, household.time_s)]
     for wanted, value in ((device.heats, "hot"), (device.cools, "cold")):
         if wanted:
             for thing in within:
                 household.set_state(thing, "temperature", value)
     if device.cooks:
-        _cook(household, target, device)
+        _cook(household, target, device, within)
     return set(within) if device.heats or device.cools else set()
 
 
@@ -126,10 +135,10 @@ def soak(household: Household, vessel: str, why: str) -> None:
             household.spoil(food, f"{food} lies in {vessel} and {why}")
 
 
-def _cook(household: Household, target: str, device: Device) -> None:
+def _cook(household: Household, target: str, device: Device, within: list[str]) -> None:
     raw = [
         n
-        for n in household.within(target)
+        for n in within
         if household.state(n, "cooked") == "raw"
         and category_of(n) not in device.cooks_not
         and (not device.cooks_only or category_of(n) in device.cooks_only)

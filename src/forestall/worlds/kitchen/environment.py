@@ -7,10 +7,10 @@ downwards: `execute` → skills → household → world. Ground truth leaves onl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,20 +18,26 @@ import numpy.typing as npt
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.domain.model import Domain
 from forestall.errors import ForestallError, SceneError
-from forestall.seams import Renderer, World
+from forestall.seams import Renderer
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Subtask
 from forestall.types.scene import SceneNeeds
 from forestall.worlds.kitchen import effects
+from forestall.worlds.kitchen.actor import Robot, SkillTimes
 from forestall.worlds.kitchen.catalogue import Catalogue, catalogue
-from forestall.worlds.kitchen.household import Household, Placed
+from forestall.worlds.kitchen.household import FLOOR, Household
+from forestall.worlds.kitchen.imperfection import ImperfectMotions, Rates
+from forestall.worlds.kitchen.law import Way, draw_law
+from forestall.worlds.kitchen.motions import Motions
 from forestall.worlds.kitchen.naming import RefusalError
 from forestall.worlds.kitchen.needs import roomed
 from forestall.worlds.kitchen.rendering.memory import FrameMemory
-from forestall.worlds.kitchen.skills import Robot, SkillTimes, perform
+from forestall.worlds.kitchen.skills import perform
+from forestall.worlds.kitchen.stage import Lifelike, Stage
+from forestall.worlds.kitchen.streams import Streams, chance
 
 SCAN_FRAMES = 7
 """Views of a full turn; 51° apart at 75° of horizontal view, so that each overlaps the next."""
@@ -49,45 +55,6 @@ ONE_VIEW_RAD = math.radians(17.0)
 AHEAD_TILT_RAD = math.radians(15.0)
 
 HOLDS = "the robot was told to hold"
-
-
-class Stage(World, Protocol):
-    """What the environment asks of a world beyond moving things: its contents and its camera."""
-
-    @property
-    def instances(self) -> Iterable[Placed]:
-        """Everything in the scene, prepared things included."""
-
-    @property
-    def data(self) -> Any:
-        """What the renderer draws."""
-
-    @property
-    def robot_position_world_m(self) -> Vec3:
-        """Where the robot stands."""
-
-    @property
-    def robot_yaw_rad(self) -> float:
-        """Its heading, counter-clockwise from +x."""
-
-    @property
-    def gripper_position_world_m(self) -> Vec3:
-        """Where its hand is."""
-
-    def turn_to(self, yaw_rad: float) -> float:
-        """Turn on the spot to a heading; returns the simulated seconds."""
-
-    def position_world_m(self, name: str) -> Vec3 | None:
-        """Middle of a thing's box, None when it is not there."""
-
-    def look_at(self, point_world_m: Sequence[float]) -> npt.NDArray[np.float64]:
-        """Camera-to-world pose (4, 4) of the head camera turned towards a point."""
-
-    def camera_to_world(self, pan_rad: float, tilt_rad: float) -> npt.NDArray[np.float64]:
-        """Camera-to-world pose (4, 4); pan to the left and tilt downwards are positive."""
-
-    def reset(self) -> None:
-        """Everything back to the start of the scene."""
 
 
 Build = Callable[[SceneNeeds, int, Catalogue], Stage]
@@ -130,6 +97,8 @@ class KitchenEnvironment:
         build: makes the world of a seed; the embedded MuJoCo kitchen by default.
         make: makes the renderer of a world; by `renderer` name by default.
         frames: what was drawn before; everything is drawn anew by default.
+        rates: how often motions go wrong; never where it is None.
+        ways: in which the household may differ from its catalogue; none by default.
     """
 
     def __init__(
@@ -144,6 +113,8 @@ class KitchenEnvironment:
         build: Build | None = None,
         make: MakeRenderer | None = None,
         frames: FrameMemory | None = None,
+        rates: Rates | None = None,
+        ways: Sequence[Way] = (),
     ) -> None:
         self._needs = roomed(needs)
         self._catalogue = catalogue(domain)
@@ -152,7 +123,9 @@ class KitchenEnvironment:
         )
         self._times = times or SkillTimes()
         self._effect_config = effect_config or effects.EffectConfig()
-        self._build = build or _build_kitchen
+        self._rates = rates
+        self._ways = tuple(ways)
+        self._build = build or (_build_kitchen if rates is None else _build_honest)
         self._make = make or _maker(renderer, frames)
         self._seed: int | None = None
         self._released: tuple[str, Vec3] | None = None
@@ -175,9 +148,19 @@ class KitchenEnvironment:
         else:
             self._world.reset()
         self._released, self._holding = None, False
-        household = Household(self._catalogue, self._world, self._world.instances)
-        self._robot = Robot(household, self._times)
+        streams, instances = chance(self._needs, seed), tuple(self._world.instances)
+        law = draw_law(streams, [i.name for i in instances if not i.prepared], self._ways)
+        household = Household(self._catalogue, self._world, instances, law)
+        self._robot = Robot(household, self._times, self._motions(streams))
         effects.settle(household, self._effect_config)
+
+    def _motions(self, streams: Streams) -> Motions:
+        if self._rates is None:
+            return Motions()
+        motions = ImperfectMotions(self._rates, streams)
+        if isinstance(self._world, Lifelike):
+            self._world.stand_with(motions.standing)
+        return motions
 
     def scan(self, thorough: bool = False) -> Observation:
         """Views all around: the base turns once on the spot, which takes its time.
@@ -230,16 +213,27 @@ class KitchenEnvironment:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""
         if self._holding:
             return SkillOutcome(SkillStatus.REFUSED, 0.0, HOLDS)
-        effects.settle(self._acting.household, self._effect_config)
-        held = self._acting.household.held
-        outcome = perform(self._acting, subtask)
-        effects.settle(self._acting.household, self._effect_config)
+        robot, household = self._acting, self._acting.household
+        effects.settle(household, self._effect_config)
+        held, believed, robot.lost = household.held, robot.believed, False
+        outcome = perform(robot, subtask)
+        for door in household.law.falling_shut(household.state):
+            household.swing(door, "closed")
+        effects.settle(household, self._effect_config)
         self._released = None
-        if held is not None and self._acting.household.held is None:
-            where = self._stage.position_world_m(held)
-            self._released = None if where is None else (held, where)
+        if held is not None and household.held is None and not robot.lost:
+            where = self._let_go_at(held, subtask)
+            self._released = None if where is None else (believed or held, where)
             outcome = replace(outcome, hand_world_m=where)
         return outcome
+
+    def _let_go_at(self, thing: str, subtask: Subtask) -> Vec3 | None:
+        """Where the hand let go: where the thing is, unless it fell from there."""
+        parent = self._acting.household.parent(thing)
+        fell = parent is not None and category_of(parent) == FLOOR
+        if fell and category_of(subtask.args[-1]) != FLOOR:
+            return self._stage.gripper_position_world_m
+        return self._stage.position_world_m(thing)
 
     def hold(self) -> None:
         """Nothing that the robot does moves anything again before `reset`."""
@@ -284,6 +278,16 @@ class KitchenEnvironment:
             raise ForestallError("the kitchen has no scene yet: call reset(seed) first")
         return self._world
 
+    def _gripper(self) -> GripperState:
+        """What the hand feels: that there is something, and what the robot took it for."""
+        world, held = self._stage, self._acting.household.held
+        width_m = None
+        if self._rates is not None and isinstance(world, Lifelike):
+            width_m = 0.0 if held is None else world.grip_width_m(held)
+        what, where = self._released or (None, None)
+        hand = world.gripper_position_world_m
+        return GripperState(self._acting.believed, hand, what, where, width_m=width_m)
+
     def _frame(self, camera_to_world: npt.NDArray[np.float64]) -> Frame:
         if self._renderer is None:
             self._renderer = self._make(self._stage, self._intrinsics)
@@ -293,9 +297,7 @@ class KitchenEnvironment:
         world, household = self._stage, self._acting.household
         return Observation(
             frames=tuple(frames),
-            gripper=GripperState(
-                household.held, world.gripper_position_world_m, *(self._released or ())
-            ),
+            gripper=self._gripper(),
             time_s=household.time_s,
             robot_position_world_m=world.robot_position_world_m,
         )
@@ -330,6 +332,13 @@ def _build_kitchen(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> Stage:
     from forestall.worlds.kitchen.model import build_scene
 
     return build_scene(needs, seed, catalogue)
+
+
+def _build_honest(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> Stage:
+    from forestall.worlds.kitchen.honest_world import HonestWorld
+    from forestall.worlds.kitchen.model import build_scene
+
+    return build_scene(needs, seed, catalogue, HonestWorld)
 
 
 def _maker(renderer: str, frames: FrameMemory | None) -> MakeRenderer:

@@ -22,6 +22,8 @@ from forestall.types.observation import Frame, Intrinsics, Vec3
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.worlds.kitchen.catalogue import Catalogue
 from forestall.worlds.kitchen.environment import KitchenEnvironment
+from forestall.worlds.kitchen.imperfection import Rates
+from forestall.worlds.kitchen.law import Way
 from forestall.worlds.kitchen.needs import roomed
 
 REACH_M = 0.8
@@ -276,14 +278,25 @@ class FlatRenderer:
         return Frame(rgb, depth, self._intrinsics, camera_to_world.copy(), ids, names)
 
 
-def flat_environment(needs: SceneNeeds, domain: Domain) -> KitchenEnvironment:
-    """A whole environment without geometry: the true rules on a flat world."""
+def flat_environment(
+    needs: SceneNeeds, domain: Domain, rates: Rates | None = None, ways: Sequence[Way] = ()
+) -> KitchenEnvironment:
+    """A whole environment without geometry: the true rules on a flat world.
+
+    Args:
+        needs: what the scene must contain.
+        domain: of the task.
+        rates: how often motions go wrong; never by default.
+        ways: in which the household may differ from its catalogue.
+    """
     return KitchenEnvironment(
         needs,
         domain,
         intrinsics=Intrinsics.from_vertical_fov(64, 48, 60.0),
         build=lambda n, seed, v: FlatWorld(flat_scene(n, seed, v)),
         make=lambda _, intrinsics: FlatRenderer(intrinsics),
+        rates=rates,
+        ways=ways,
     )
 
 

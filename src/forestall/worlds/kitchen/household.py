@@ -17,6 +17,7 @@ from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.observation import Vec3
 from forestall.worlds.kitchen.catalogue import Catalogue, Category
+from forestall.worlds.kitchen.law import LAW_EVENT, Law
 
 FLOOR = "Floor"
 """Category that takes what falls."""
@@ -60,6 +61,17 @@ class Boxes(Protocol):
         """Low and high corner of a thing in the world."""
 
 
+@runtime_checkable
+class Untidy(Protocol):
+    """A world that can show what has half succeeded."""
+
+    def leave_ajar(self, name: str, towards: str) -> None:
+        """Leave a door a little way open, on its way to a state that it does not reach."""
+
+    def lay(self, name: str) -> None:
+        """Lay a thing that stands on its side."""
+
+
 def number_of(name: str) -> int:
     """The instance number of a name, 0 without one."""
     tail = name.rpartition("-")[2]
@@ -78,11 +90,19 @@ class Household:
         catalogue: categories and their properties.
         world: moves things and shows states.
         instances: everything in the scene, prepared things included.
+        law: how it differs from its catalogue; not at all by default.
     """
 
-    def __init__(self, catalogue: Catalogue, world: World, instances: Iterable[Placed]) -> None:
+    def __init__(
+        self,
+        catalogue: Catalogue,
+        world: World,
+        instances: Iterable[Placed],
+        law: Law | None = None,
+    ) -> None:
         self.catalogue = catalogue
         self.world = world
+        self.law = law or Law()
         self.held: str | None = None
         self.time_s = 0.0
         self._parents: dict[str, str | None] = {}
@@ -92,6 +112,8 @@ class Household:
         self._spoiled: set[str] = set()
         self._events: list[Event] = []
         self._tempered_s: dict[str, float] = {}
+        self._ajar: set[str] = set()
+        self._lying: set[str] = set()
         for instance in sorted(instances, key=lambda i: natural_key(i.name)):
             states = catalogue.default_states(instance.category) | dict(instance.states)
             self._states[instance.name] = states
@@ -99,6 +121,8 @@ class Household:
                 self._waiting.append(instance.name)
             else:
                 self._parents[instance.name] = instance.parent
+        for deviation in self.law.deviations:
+            self.record(LAW_EVENT, (deviation.thing,), str(deviation))
 
     # what is there
 
@@ -194,6 +218,36 @@ class Household:
         self.record(STATE_EVENT, (name,), str(Literal(attribute, (name,), value)))
         return True
 
+    def swing(self, name: str, value: str) -> None:
+        """Open or close a thing all the way."""
+        was_ajar = name in self._ajar
+        self._ajar.discard(name)
+        if not self.set_state(name, "open", value) and was_ajar:
+            self.world.show(name, "open", value)
+
+    def leave_ajar(self, name: str, towards: str) -> None:
+        """Leave a thing between its state, which it keeps, and another.
+
+        What was to be opened counts as closed: nothing goes in; what was to be closed as open.
+        """
+        self._ajar.add(name)
+        if isinstance(self.world, Untidy):
+            self.world.leave_ajar(name, towards)
+
+    def is_ajar(self, name: str) -> bool:
+        """Whether a thing is neither open nor closed all the way."""
+        return name in self._ajar
+
+    def lay(self, name: str) -> None:
+        """Lay a vessel on its side; it takes no liquid until it is picked up."""
+        self._lying.add(name)
+        if isinstance(self.world, Untidy):
+            self.world.lay(name)
+
+    def is_lying(self, name: str) -> bool:
+        """Whether a vessel lies on its side."""
+        return name in self._lying
+
     def tempered_s(self, name: str) -> float:
         """When a thing was last heated or cooled."""
         return self._tempered_s.get(name, 0.0)
@@ -203,6 +257,7 @@ class Household:
     def hold(self, name: str) -> None:
         """Take a thing, with what is in it, into the gripper."""
         self.world.hold(name)
+        self._lying.discard(name)
         self._parents[name] = None
         self.held = name
         self.record(RELATION_EVENT, (name,), str(Literal("held_by", (name, GRIPPER))))

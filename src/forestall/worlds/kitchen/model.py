@@ -48,13 +48,19 @@ STARTS = 40
 """How many other start places are tried."""
 
 
-def build_scene(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> KitchenWorld:
+def build_scene(
+    needs: SceneNeeds,
+    seed: int,
+    catalogue: Catalogue,
+    make: type[KitchenWorld] = KitchenWorld,
+) -> KitchenWorld:
     """Build the scene of a seed, the same each time.
 
     Args:
         needs: what must be there; everything else varies with the seed.
         seed: 0 or more.
         catalogue: categories, those of the task file included.
+        make: what the geometry is.
 
     Raises:
         SceneError: contradictory needs, or no room for something.
@@ -70,7 +76,7 @@ def build_scene(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> KitchenWo
     for attempt in range(LAYOUTS):
         streams = Streams(seed, attempt, dict(needs.vary))
         contents = contents_of(needs, base, catalogue, streams)
-        empty = _empty_room(needs, base, contents.things, catalogue, streams)
+        empty = _empty_room(needs, base, contents.things, catalogue, streams, make)
         start = empty.world.bodies.snapshot()
         for stocking in range(STOCKINGS):
             empty.world.bodies.restore(start)
@@ -152,6 +158,7 @@ def _empty_room(
     things: Sequence[Thing],
     catalogue: Catalogue,
     streams: Streams,
+    make: type[KitchenWorld],
 ) -> _Empty:
     plan, start = _drawn(needs.room, streams)
     colours = streams("colours")
@@ -172,7 +179,7 @@ def _empty_room(
     bodies = Bodies(compile_kit(kit), forms, states)
     area = Rect(-plan.width / 2, -plan.depth / 2, plan.width / 2, plan.depth / 2)
     floor = Floor(area, tuple(item.rect() for item in plan.items if item.z == 0))
-    world = KitchenWorld(bodies, floor, start, _decks(plan))
+    world = make(bodies, floor, start, _decks(plan))
     return _Empty(world, fixtures, plan, floor)
 
 
@@ -254,7 +261,7 @@ def _restarted(empty: _Empty, streams: Streams) -> KitchenWorld:
     for again in range(STARTS):
         start = Standing(*layout.free_place(empty.plan, streams("start", again)))
         if world.connected(start, world.standing):
-            return KitchenWorld(world.bodies, empty.floor, start, _decks(empty.plan))
+            return type(world)(world.bodies, empty.floor, start, _decks(empty.plan))
     raise SceneError("the robot finds no other place to start from")
 
 

@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import Enum
 
 from forestall.domain.model import Domain
-from forestall.errors import UnknownNameError
+from forestall.errors import InputError, UnknownNameError
 from forestall.types.scene import SceneNeeds
 from forestall.types.world import Working
 from forestall.worlds.kitchen.environment import KitchenEnvironment, KitchenOracle
+from forestall.worlds.kitchen.imperfection import Rates
+from forestall.worlds.kitchen.law import WAYS
 from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
 
 
@@ -34,22 +37,55 @@ class OpenKitchen:
         return self.environment
 
 
+class Profile(Enum):
+    """How kind the household is."""
+
+    KIND = "kind"
+    HONEST = "honest"
+
+
+class LawOption(Enum):
+    """Whether the household differs from what the domain file says."""
+
+    PROFILE = "profile"
+    KNOWN = "known"
+    DRAWN = "drawn"
+
+
 class Kitchens:
     """Implements `WorldPart`.
 
     Args:
         renderer: "auto", "embree", "rays" or "gl".
+        profile: "kind": every skill does what was meant, and the household is as its domain file
+            says; "honest": skills go wrong now and then, and the household differs in drawn ways.
+        law: whether the household differs from the domain file: "known" (never), "drawn", or as
+            the profile has it.
+        rates: how often skills go wrong, for the profile "honest".
 
     Raises:
         UnknownNameError: no such renderer.
+        InputError: rates for a profile in which nothing goes wrong.
     """
 
     name = "kitchen"
 
-    def __init__(self, renderer: str = "auto") -> None:
+    def __init__(
+        self,
+        renderer: str = "auto",
+        profile: Profile = Profile.KIND,
+        law: LawOption = LawOption.PROFILE,
+        rates: Rates | None = None,
+    ) -> None:
         if renderer not in RENDERERS:
             raise UnknownNameError("renderer", renderer, RENDERERS)
+        honest = profile is Profile.HONEST
+        if rates is not None and not honest:
+            raise InputError("rates of failing skills belong to the profile honest")
         self._renderer = renderer
+        self._rates = (rates or Rates()) if honest else None
+        drawn = honest if law is LawOption.PROFILE else law is LawOption.DRAWN
+        self._ways = WAYS if drawn else ()
         self._frames = FrameMemory()
 
     @contextmanager
@@ -58,7 +94,9 @@ class Kitchens:
     ) -> Iterator[OpenKitchen]:
         """See the Protocol."""
         frames = self._frames if remember else None
-        kitchen = KitchenEnvironment(needs, domain, self._renderer, frames=frames)
+        kitchen = KitchenEnvironment(
+            needs, domain, self._renderer, frames=frames, rates=self._rates, ways=self._ways
+        )
         try:
             yield OpenKitchen(kitchen)
         finally:

@@ -10,17 +10,17 @@ category is good for is read from the catalogue.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from inspect import signature
 
-from forestall.errors import ForestallError, SceneError
+from forestall.errors import SceneError
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.plan import Subtask
 from forestall.worlds.kitchen import effects
-from forestall.worlds.kitchen.household import FLOOR, Household, number_of
+from forestall.worlds.kitchen.actor import Robot
+from forestall.worlds.kitchen.household import FLOOR, number_of
+from forestall.worlds.kitchen.motions import FailureError
 from forestall.worlds.kitchen.naming import (
     RefusalError,
-    resolve_carried,
     resolve_receptacle,
     resolve_settled,
     resolve_thing,
@@ -31,74 +31,19 @@ KNIFE = "Knife"
 """Category that slicing needs in the hand."""
 
 
-@dataclass(frozen=True, slots=True)
-class SkillTimes:
-    """Fixed duration of each manipulation in simulated seconds; driving comes on top."""
-
-    pick_s: float = 4.0
-    put_s: float = 4.0
-    open_s: float = 3.0
-    toggle_s: float = 2.0
-    slice_s: float = 6.0
-    crack_s: float = 3.0
-    pour_s: float = 4.0
-    turn_s_per_90deg: float = 1.0
-
-
-class Robot:
-    """Who acts: the household, the durations, and what the robot faces.
-
-    `focus` is the last thing that was driven to or handled; something let go of lands there.
-    """
-
-    def __init__(self, household: Household, times: SkillTimes) -> None:
-        self.household = household
-        self.times = times
-        self.focus: str | None = None
-
-    def drive(self, name: str) -> None:
-        """Drive to a thing, whatever the distance, and face it.
-
-        Raises:
-            RefusalError: there is no way to it.
-        """
-        try:
-            self.household.time_s += self.household.world.drive_to(name)
-        except ForestallError as error:
-            raise RefusalError(f"there is no way to {name}: {error}") from error
-        self.focus = name
-
-    def approach(self, name: str) -> None:
-        """Drive to a thing if it is out of reach, and face it."""
-        if name == self.household.held:
-            return
-        if self.household.world.within_reach(name):
-            self.focus = name
-            return
-        self.drive(name)
-        if not self.household.world.within_reach(name):
-            raise RefusalError(f"{name} stays out of reach")
-
-    def need_accessible(self, name: str) -> None:
-        """Refuse what lies in something closed."""
-        closed = self.household.closed_around(name)
-        if closed is not None:
-            raise RefusalError(f"{name} cannot be reached: {closed} is closed")
-
-    def done(self, seconds: float) -> str:
-        """Let the time of a manipulation pass; the empty reason of a success."""
-        self.household.time_s += seconds
-        return ""
-
-
 def perform(robot: Robot, subtask: Subtask) -> SkillOutcome:
     """Run one skill on the household; what cannot be done is refused and never raised."""
     start_s = robot.household.time_s
     try:
         reason = _skill_of(subtask)(robot, *subtask.args)
         status = SkillStatus.SUCCEEDED
+    except FailureError as failure:
+        reason, status = str(failure), SkillStatus.FAILED
     except (RefusalError, SceneError) as refusal:
         reason, status = str(refusal), SkillStatus.REFUSED
+    held = robot.household.held
+    if held is not None and robot.believed is not None:
+        reason = reason.replace(held, robot.believed)
     return SkillOutcome(status, robot.household.time_s - start_s, reason)
 
 
@@ -122,6 +67,7 @@ def navigate_to_obj(robot: Robot, target: str) -> str:
         name = resolve_thing(home, target)
     if name == robot.household.held:
         return f"{name} is in the gripper"
+    robot.motions.set_out(robot, name)
     robot.drive(name)
     return ""
 
@@ -142,14 +88,14 @@ def pick_up(robot: Robot, what: str) -> str:
         raise RefusalError(f"{name} cannot be grasped: {blocker} stands in front of it")
     in_reach = facing is not None and home.exists(facing) and home.world.within_reach(facing)
     robot.focus = facing if in_reach and facing != name else home.parent(name)
-    home.hold(name)
+    robot.motions.take(robot, name)
     return robot.done(robot.times.pick_s)
 
 
 def put(robot: Robot, what: str, target: str) -> str:
     """Needs the thing in the gripper and a receptacle that takes it, has room and is open."""
     home = robot.household
-    name = resolve_carried(home, what)
+    name = robot.carried(what)
     if name != home.held:
         settled = resolve_settled(home, what, target)
         if settled is not None:
@@ -161,8 +107,7 @@ def put(robot: Robot, what: str, target: str) -> str:
     full = why_no_room(home, name, place)
     if full is not None:
         raise RefusalError(full)
-    home.put(name, place)
-    effects.arrived(home, name, place)
+    robot.motions.release(robot, name, place)
     return robot.done(robot.times.put_s)
 
 
@@ -186,20 +131,22 @@ def open_obj(robot: Robot, target: str) -> str:
     """Needs a thing that opens and, if it works closed only, is off."""
     name = _openable(robot, target, "opened")
     home = robot.household
-    if home.state(name, "open") == "open":
+    if home.state(name, "open") == "open" and not home.is_ajar(name):
         return f"{name} is already open"
     device = home.category(name).device
     if device is not None and device.needs_closed and home.state(name, "toggled") == "on":
         raise RefusalError(f"{name} does not open while it is on")
-    home.set_state(name, "open", "open")
+    robot.motions.swing(robot, name, "open")
     return robot.done(robot.times.open_s)
 
 
 def close_obj(robot: Robot, target: str) -> str:
     """Needs a thing that opens."""
     name = _openable(robot, target, "closed")
-    if not robot.household.set_state(name, "open", "closed"):
+    home = robot.household
+    if home.state(name, "open") == "closed" and not home.is_ajar(name):
         return f"{name} is already closed"
+    robot.motions.swing(robot, name, "closed")
     return robot.done(robot.times.open_s)
 
 
@@ -216,7 +163,8 @@ def toggle_on(robot: Robot, target: str) -> str:
     """Needs what the device needs: something held, or its door closed."""
     name = _switchable(robot, target, "on")
     home = robot.household
-    if home.state(name, "toggled") == "on":
+    turned = home.law.wired(name)
+    if home.state(turned, "toggled") == "on":
         return f"{name} is already on"
     device = home.category(name).device
     if device is not None and device.needs_held is not None:
@@ -226,15 +174,18 @@ def toggle_on(robot: Robot, target: str) -> str:
             raise RefusalError(f"{name} is turned on with the {words}, which is not in the gripper")
     if device is not None and device.needs_closed and home.state(name, "open") == "open":
         raise RefusalError(f"{name} cannot be turned on while it is open")
-    home.set_state(name, "toggled", "on")
+    robot.motions.switch(robot, turned, "on")
     return robot.done(robot.times.toggle_s)
 
 
 def toggle_off(robot: Robot, target: str) -> str:
     """Needs a thing that can be switched."""
     name = _switchable(robot, target, "off")
-    if not robot.household.set_state(name, "toggled", "off"):
+    home = robot.household
+    turned = home.law.wired(name)
+    if home.state(turned, "toggled") == "off":
         return f"{name} is already off"
+    robot.motions.switch(robot, turned, "off")
     return robot.done(robot.times.toggle_s)
 
 
@@ -266,6 +217,7 @@ def slice_obj(robot: Robot, what: str) -> str:
         raise RefusalError(f"{name} cannot be sliced without a knife: the gripper {holding}")
     robot.need_accessible(name)
     robot.approach(name)
+    robot.motions.cut(robot, name)
     _refocus(robot, name)
     for piece in home.replace(name, category.slices_into, category.slices, "sliced"):
         parent = home.parent(piece)
@@ -277,7 +229,7 @@ def slice_obj(robot: Robot, what: str) -> str:
 def crack_obj(robot: Robot, what: str) -> str:
     """Needs an egg that is held or within reach; a held one lands in what the robot faces."""
     home = robot.household
-    name = resolve_carried(home, what)
+    name = robot.carried(what)
     category = home.category(name)
     if category.cracks_into is None:
         raise RefusalError(f"{name} cannot be cracked")
@@ -285,10 +237,11 @@ def crack_obj(robot: Robot, what: str) -> str:
         place = _under_the_hand(robot, name, category.cracks_into)
         if place is None:
             raise RefusalError(f"there is no room for what is in {name}")
-        home.put(name, place)
+        home.put(name, robot.motions.crack(robot, name, place) or place)
     else:
         robot.need_accessible(name)
         robot.approach(name)
+        robot.motions.crack(robot, name, None)
     _refocus(robot, name)
     for cracked in home.replace(name, category.cracks_into, 1, "cracked"):
         parent = home.parent(cracked)
@@ -329,7 +282,7 @@ def _under_the_hand(robot: Robot, held: str, becomes: str) -> str | None:
 def pour(robot: Robot, what: str, target: str) -> str:
     """Needs a held vessel with liquid and something that takes or drains it."""
     home = robot.household
-    name = resolve_carried(home, what)
+    name = robot.carried(what)
     if name != home.held:
         raise RefusalError(f"{name} is not in the gripper")
     liquid = home.state(name, "filled")
@@ -343,16 +296,7 @@ def pour(robot: Robot, what: str, target: str) -> str:
         raise RefusalError(f"nothing can be poured into {place}")
     robot.need_accessible(place)
     robot.approach(place)
-    if drains:
-        home.set_state(name, "filled", "empty")
-    elif takes == "empty":
-        home.set_state(name, "filled", "empty")
-        home.set_state(place, "filled", liquid)
-        home.set_state(place, "temperature", home.state(name, "temperature") or "room")
-        effects.soak(home, place, f"{liquid} was poured onto it")
-    else:
-        effects.spill(home, name, f"{place} was already full of {takes}")
-        effects.soak(home, place, f"{liquid} was poured onto it")
+    robot.motions.pour(robot, name, place)
     return robot.done(robot.times.pour_s)
 
 

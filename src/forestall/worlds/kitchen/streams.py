@@ -1,6 +1,7 @@
 """Named random streams of one scene: what one of them draws never changes what another draws.
 
-`model` makes them; `plans`, `contents`, `stocking` and `changes` draw from them. A stream belongs
+`model` makes them; `plans`, `contents`, `stocking` and `changes` draw from them, and from those of
+`chance` what happens while a robot works there. A stream belongs
 to an axis of variety (`needs.AXES`) or to nothing that varies alone (places). Which
 layout is being tried enters the streams of the room and of places, not those of looks, so that a
 scene that needs its second layout keeps its colours.
@@ -13,6 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+
+from forestall.types.scene import SceneNeeds
 
 _OF_THE_SEED = frozenset({"colours", "light", "clutter"})
 """Axes whose draws stay the same whichever layout of the seed is tried."""
@@ -45,3 +48,12 @@ class Streams:
     def without(self, axis: str) -> Streams:
         """The same streams with one axis as in the undisturbed scene."""
         return replace(self, numbers={a: n for a, n in self.numbers.items() if a != axis})
+
+
+def chance(needs: SceneNeeds, seed: int) -> Streams:
+    """The streams of what happens by chance in a scene, the same with and without a scenario.
+
+    Scenes of one seed that are made for different tasks have different ones.
+    """
+    made_for = " ".join(sorted(n.id for n in (needs.undisturbed or needs).objects))
+    return Streams(zlib.crc32(f"{seed} {made_for}".encode()))
