@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Flag = Annotated[bool, Parameter(negative="")]
 
-domain = App(name="domain", help="List, show, check and export domains.")
+domain = App(name="domain", help="List, show, check, distort and export domains.")
 
 
 @domain.command(name="list")
@@ -90,6 +90,42 @@ def learn(*sources: Path, out: Path | None = None, name: str = "learnt") -> int:
         return 0
     out.write_text(text, encoding="utf-8")
     print(f"{out}: {_sentence(learnt.domain)}")
+    return 0
+
+
+@domain.command
+def distort(
+    name: str,
+    /,
+    *,
+    kind: Literal["exact", "coarse", "wrong"] = "wrong",
+    seed: int = 0,
+    share: float = 0.1,
+    out: Path | None = None,
+) -> int:
+    """Make a domain that says less than another one, or something wrong, to judge with.
+
+    Args:
+        name: of a domain that comes with the project, or a TOML or PDDL file.
+        kind: exact: as it is; coarse: what plain operators can say; wrong: some of its skills and
+            processes say one thing wrong each.
+        seed: of what is wrong.
+        share: which part of the skills and processes is wrong; at least one is.
+        out: the file to write; printed by default.
+    """
+    from forestall.domain.distort import distorted
+    from forestall.domain.load import load_domain
+    from forestall.domain.toml_out import domain_toml
+
+    found = distorted(load_domain(name), kind, seed, share)
+    changes = "".join(f"# - {c}\n" for c in found.changes)
+    what = f"seed {seed}" if kind == "wrong" else f"{len(found.changes)} changes"
+    text = f"# {name}, {kind} ({what}):\n{changes}\n{domain_toml(found.domain)}"
+    if out is None:
+        print(text, end="")
+        return 0
+    out.write_text(text, encoding="utf-8")
+    print("\n".join((f"{out}: {_sentence(found.domain)}", *(f"  {c}" for c in found.changes))))
     return 0
 
 
