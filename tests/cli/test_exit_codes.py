@@ -135,3 +135,40 @@ def test_names_in_files_steer_no_terminal(
     two.rename(tmp_path / "three\x1b[31m.json")
     assert call(["compare", str(one), str(tmp_path / "three\x1b[31m.json")]) == 2
     assert "\x1b" not in capsys.readouterr().err
+
+
+PARTS = """
+from forestall.detection.scene_graph import SceneGraphDetector
+from forestall.errors import PerceptionError
+
+
+class Broken:
+    name = "broken"
+
+    def judge(self, observed, observation, references):
+        raise {error}
+"""
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        ("ZeroDivisionError('division by zero')", 70, "internal error"),
+        ("PerceptionError('the lens is cracked')", 3, "the lens is cracked"),
+    ],
+)
+def test_a_run_that_was_held_does_not_look_like_a_task_that_failed(
+    error: str,
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    name = f"parts_of_test_{code}"
+    (tmp_path / f"{name}.py").write_text(PARTS.format(error=error), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    run = ["run", "fasten-plate", "--out", str(tmp_path / "run"), "--quiet"]
+    assert call([*run, "--detector", f"{name}:Broken"]) == code
+    printed = capsys.readouterr()
+    assert said in printed.err and "detector" in printed.err

@@ -2,8 +2,9 @@
 
 Exit codes: 0 done, and for a run: the task succeeded; 1 the run ended and the task failed, or a
 check raised an alarm; 2 what was given is not valid; 3 something else that forestall names (a
-damaged memory or model, a scene without room, a full disk); 4 a check that could not be judged; 70
-a fault of forestall itself; 130 interrupted. Nothing but a command's own answer gives 0, 1 or 4,
+damaged memory or model, a scene without room, a full disk, a world or a part that failed or was
+late); 4 a check that could not be judged, a run whose senses were not to be trusted; 70 a fault of
+forestall itself; 130 interrupted. Nothing but a command's own answer gives 0, 1 or 4,
 so this file imports only what cannot fail before it may catch.
 """
 

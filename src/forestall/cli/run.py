@@ -6,12 +6,15 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from forestall.cli.demos import memory_of
 from forestall.cli.flags import RunFlags
+
+if TYPE_CHECKING:
+    from forestall.types.episode import EpisodeRecord
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 
@@ -74,7 +77,25 @@ def run(
         print(json.dumps(data, indent=2))
     else:
         _summary(data)
-    return 0 if record.success else 1
+    return _code(record)
+
+
+def _code(record: EpisodeRecord) -> int:
+    """The exit code of a run; what held or broke it is said on standard error."""
+    from forestall.cli.main import OF_ITS_OWN
+    from forestall.reading.printing import shown
+    from forestall.types.episode import TroubleKind
+
+    trouble = record.trouble
+    if trouble is None:
+        return 0 if record.success else 1
+    print(f"forestall: held: {shown(trouble.text)}", file=sys.stderr)
+    codes = {
+        TroubleKind.INTERNAL: OF_ITS_OWN,
+        TroubleKind.SENSES: 4,
+        TroubleKind.TOO_MANY: 1,
+    }
+    return codes.get(trouble.kind, 3)
 
 
 def _count(number: int, what: str) -> str:
