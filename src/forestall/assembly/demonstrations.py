@@ -17,6 +17,7 @@ from pathlib import Path
 
 import forestall
 from forestall.assembly.configuration import Choice, Given, RunConfig, digest_of, run_config
+from forestall.assembly.kept import KeptObservations
 from forestall.assembly.make import prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
@@ -63,12 +64,14 @@ class RecordingJob:
         first_seed: of the range.
         given: what was said about the parts; only `RECORDED` ones and the domain count.
         tries: length of the range.
+        keep: the memory beside which all that is seen is kept; None: it is not.
     """
 
     task: str
     first_seed: int
     given: Given = field(default_factory=Given)
     tries: int = TRIES
+    keep: Path | None = None
 
     def config(self, seed: int) -> RunConfig:
         """The nominal run of one seed, with all that a demonstration keeps."""
@@ -87,10 +90,15 @@ def jobs_for(
     kitchens: int = KITCHENS_PER_TASK,
     seed: int = DEMONSTRATION_SEEDS,
     given: Given | None = None,
+    keep: Path | None = None,
 ) -> list[RecordingJob]:
     """`kitchens` jobs for each task, each with seeds of its own."""
     said = given or Given()
-    return [RecordingJob(task, seed + 10 * k, said) for task in tasks for k in range(kitchens)]
+    return [
+        RecordingJob(task, seed + 10 * k, said, keep=keep)
+        for task in tasks
+        for k in range(kitchens)
+    ]
 
 
 def record_one(job: RecordingJob) -> Demonstration:
@@ -105,7 +113,8 @@ def record_one(job: RecordingJob) -> Demonstration:
         prepared = prepare(config)
         viewer = make_viewer(config, prepared.loaded.domain)
         record = run_episode(prepared, None)
-        demonstration = demonstration_from(record, forestall.__version__, view_of=viewer)
+        keep = None if job.keep is None else KeptObservations(job.keep).keep
+        demonstration = demonstration_from(record, forestall.__version__, view_of=viewer, keep=keep)
         if demonstration is not None:
             return demonstration
         why = record.failures
@@ -203,7 +212,8 @@ def keyed(jobs: Sequence[RecordingJob]) -> dict[str, RecordingJob]:
         said = repr((job.task, job.given))
         if said not in digests:
             digests[said] = _content(job.config(job.first_seed))
-        found[f"{digests[said]} {job.first_seed} {job.tries}"] = job
+        kept = "" if job.keep is None else " with observations"
+        found[f"{digests[said]} {job.first_seed} {job.tries}{kept}"] = job
     return found
 
 

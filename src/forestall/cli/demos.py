@@ -36,6 +36,7 @@ def record(
     seed: int | None = None,
     parts: SeeingFlags = DEFAULTS,
     jobs: int | None = None,
+    keep_observations: Annotated[bool, Parameter(negative="")] = False,
     quiet: Quiet = False,
 ) -> int:
     """Run nominal plans in seeded kitchens and keep the successful runs; goes on after a kill.
@@ -47,6 +48,8 @@ def record(
         seed: first seed of the demonstration scenes.
         parts: which parts; the feature "image" keeps the look of every object.
         jobs: how many processes; all cores by default.
+        keep_observations: keep pictures, depth and masks beside the memory, so that it can be
+            perceived anew (about 1.5 MB a picture of 640 × 480).
         quiet: no progress bar.
     """
     from forestall.assembly.configuration import run_config
@@ -93,6 +96,31 @@ def add(memory: Path, /, *sources: Path) -> int:
     if not sources:
         raise InputError("no source was named: give the folder of at least one run, or a file")
     return _kept(memory, demonstrations_from(sources))
+
+
+@demos.command
+def perceive(
+    memory: Path,
+    out: Path,
+    /,
+    *,
+    parts: SeeingFlags = DEFAULTS,
+) -> int:
+    """See what the demonstrations of a memory saw once more, with other eyes.
+
+    Needs a memory that was recorded with --keep-observations. Masks are those that were kept,
+    states are read off the pictures; what was seen between two subtasks is not kept.
+
+    Args:
+        memory: the demonstration file to read.
+        out: the demonstration file to add to; made when it does not exist.
+        parts: with which parts; --domain where it is not the household.
+    """
+    from forestall.assembly.kept import seen_anew
+    from forestall.memory.store import open_store
+
+    with open_store(memory) as store:
+        return _kept(out, seen_anew(memory, store.required(), parts.given()))
 
 
 @demos.command

@@ -111,6 +111,8 @@ def encode(demonstration: Demonstration) -> Encoded:
         things["views"] = [
             None if s.view is None else _view_json(s.view) for s in demonstration.steps
         ]
+    if any(s.observation is not None for s in demonstration.steps):
+        things["observations"] = [s.observation for s in demonstration.steps]
     return Encoded(
         task=demonstration.task,
         scene=demonstration.scene,
@@ -153,6 +155,10 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
         looks = [None] * len(encoded.steps) if views is None else views.tuple_of(_view)
         if len(looks) != len(encoded.steps):
             raise DamageError(f"it has {len(encoded.steps)} steps and {len(looks)} views")
+        kept = things.find("observations")
+        seen = [None] * len(encoded.steps) if kept is None else kept.tuple_of(_hash)
+        if len(seen) != len(encoded.steps):
+            raise DamageError(f"it has {len(encoded.steps)} steps and {len(seen)} observations")
         steps = tuple(
             DemonstrationStep(
                 index=s.index,
@@ -161,8 +167,9 @@ def decode(encoded: Encoded, name: str, digest: str) -> Demonstration:
                 whole=_graph(Field(_unpack(s.whole), f"step {s.index}, whole"), shared),
                 image=s.image,
                 view=view,
+                observation=observation,
             )
-            for s, view in zip(encoded.steps, looks, strict=True)
+            for s, view, observation in zip(encoded.steps, looks, seen, strict=True)
         )
         last = things.optional("final", lambda f: _graph(f, shared))
         perception = Field(parse_json(encoded.perception), "perception").tuple_of(_pair)
@@ -216,6 +223,10 @@ def _view(field: Field) -> View | None:
     if view is not None and view.image is not None:
         whole_numbers(view.image)
     return view
+
+
+def _hash(field: Field) -> str | None:
+    return None if field.value is None else field.text()
 
 
 def _pair(field: Field) -> tuple[str, str]:

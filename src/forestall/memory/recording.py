@@ -19,6 +19,7 @@ def demonstration_from(
     version: str,
     keep_image: Callable[[Rgb], str] | None = None,
     view_of: Callable[[BoundaryRecord], View | None] | None = None,
+    keep: Callable[[Observation], str] | None = None,
 ) -> Demonstration | None:
     """The demonstration of a record, None when the run or one of its steps did not succeed.
 
@@ -29,6 +30,7 @@ def demonstration_from(
         version: of the software, for the store.
         keep_image: stores a picture and returns its content hash; None keeps no pictures.
         view_of: says what the picture of a boundary comes down to; None keeps no views.
+        keep: stores all that was seen and returns its content hash; None keeps nothing of it.
     """
     smooth = all(e.outcome.status is SkillStatus.SUCCEEDED for e in record.executed)
     replanned = any(b.outcome is Outcome.REPLAN for b in record.boundaries)
@@ -52,6 +54,11 @@ def demonstration_from(
                 or not b.observation.frames
                 else keep_image(b.observation.frames[-1].rgb),
                 view=None if view_of is None else view_of(b),
+                observation=None
+                if keep is None
+                or not isinstance(b.observation, Observation)
+                or not b.observation.frames
+                else keep(b.observation),
             )
             for b in last_look.values()
         ),

@@ -28,7 +28,8 @@ class DemonstrationStep:
 
     `graph` is scoped to the subtask, `whole` is everything that was known. `image` is the content
     hash of the stored picture, None when pictures are not kept. `view` is None where nobody looked
-    at the picture as a whole.
+    at the picture as a whole. `observation` is the content hash of all that was seen (pictures,
+    depth, masks, cameras, hand), None where it was not kept.
     """
 
     index: int
@@ -37,6 +38,7 @@ class DemonstrationStep:
     whole: SceneGraph
     image: str | None = None
     view: View | None = None
+    observation: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,152 @@
+"""Everything that a demonstration saw, kept by its content, so that it can be perceived anew.
+
+Beside a memory `pegs.db` lies the folder `pegs.db.observations`, in it one folder for each
+observation, in the format of docs/observation-format.md, named by the hash of its files. Called by
+recording, by `sources` and the command line; calls perception's reader and writer.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+import uuid
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from forestall.assembly.configuration import Given, choices, domain_of
+from forestall.assembly.parts import Assembly
+from forestall.domain.model import Domain
+from forestall.errors import InputError, MemoryFileError
+from forestall.kinds import DOMAIN, PERCEIVER
+from forestall.perception.folder import read_observation, write_observation
+from forestall.seams import Perceiver
+from forestall.types.demonstration import Demonstration
+from forestall.types.observation import Observation
+
+_HASH = re.compile(r"^[0-9a-f]{32}$")
+
+
+class KeptObservations:
+    """The observations of one memory.
+
+    Args:
+        memory: its file.
+    """
+
+    def __init__(self, memory: Path) -> None:
+        self.folder = memory.with_name(memory.name + ".observations")
+
+    def keep(self, observation: Observation) -> str:
+        """Store an observation, once; returns the hash of its files.
+
+        Killed at any moment, it leaves the whole of it or a folder that nobody reads.
+
+        Raises:
+            MemoryFileError: the folder cannot be written.
+        """
+        partial = self.folder / f".{uuid.uuid4().hex}"
+        try:
+            write_observation(partial, observation)
+            name = _digest(partial)
+            place = self._place(name)
+            if place.exists():
+                shutil.rmtree(partial)
+            else:
+                place.parent.mkdir(parents=True, exist_ok=True)
+                _moved(partial, place)
+        except OSError as error:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise MemoryFileError(
+                f"cannot keep an observation in {self.folder}: {error}"
+            ) from error
+        return name
+
+    def get(self, name: str, domain: Domain) -> Observation:
+        """A stored observation.
+
+        Raises:
+            MemoryFileError: there is none, or its files are not what they were.
+        """
+        place = self._place(name) if _HASH.match(name) else None
+        if place is None or not place.is_dir():
+            raise MemoryFileError(f"observation {name!r} is not in {self.folder}")
+        if _digest(place) != name:
+            raise MemoryFileError(f"observation {place} is damaged: its content has changed")
+        return read_observation(place, domain)[0]
+
+    def _place(self, name: str) -> Path:
+        return self.folder / name[:2] / name
+
+
+def perceived_anew(
+    demonstrations: Sequence[Demonstration],
+    kept: KeptObservations,
+    perceiver: Perceiver,
+    domain: Domain,
+) -> list[Demonstration]:
+    """The same demonstrations as another perceiver sees them.
+
+    It sees what was kept: the looks before each subtask, and nothing of looks in between. What was
+    known after the last subtask is left out.
+
+    Args:
+        demonstrations: each with all its observations.
+        kept: where these are.
+        perceiver: sees them; it is reset for each demonstration.
+        domain: of all of them.
+
+    Raises:
+        InputError: a step whose observation was not kept.
+        MemoryFileError: an observation that is gone or damaged.
+    """
+    found = []
+    for d in demonstrations:
+        perceiver.reset()
+        steps = []
+        for step in d.steps:
+            if step.observation is None:
+                raise InputError(
+                    f"what demonstration {d.id} saw before {step.subtask} was not kept: record it "
+                    "with --keep-observations"
+                )
+            graph = perceiver.perceive(kept.get(step.observation, domain))
+            scoped = perceiver.scope(graph, step.subtask)
+            steps.append(replace(step, graph=scoped, whole=graph, view=None))
+        described = tuple(sorted(perceiver.describe().items()))
+        found.append(replace(d, steps=tuple(steps), perception=described, final=None))
+    return found
+
+
+def seen_anew(
+    memory: Path, demonstrations: Sequence[Demonstration], given: Given
+) -> list[Demonstration]:
+    """What `perceived_anew` gives with the parts that somebody named.
+
+    Masks are the kept ones, states are read off pictures, unless something else is said.
+    """
+    chosen = choices(given.over(Given.named({"segmenter": "given-masks"})))
+    domain = domain_of(given.chosen(DOMAIN.name))
+    states: dict[str, dict[str, str]] = {}
+    perceiver = Assembly(chosen, domain, None, {"states": states}).part(PERCEIVER)
+    return perceived_anew(demonstrations, KeptObservations(memory), perceiver, domain)
+
+
+def _moved(partial: Path, place: Path) -> None:
+    """Give it its name, unless another process was first."""
+    try:
+        partial.rename(place)
+    except OSError:
+        if not place.is_dir():
+            raise
+        shutil.rmtree(partial)
+
+
+def _digest(folder: Path) -> str:
+    hasher = hashlib.blake2b(digest_size=16)
+    for file in sorted(folder.iterdir()):
+        content = file.read_bytes()
+        hasher.update(f"{file.name} {len(content)} ".encode())
+        hasher.update(content)
+    return hasher.hexdigest()
