@@ -69,7 +69,7 @@ def record(
     given, names = parts.given(), task or list(task_names())
     for name in names:
         run_config(name, given=given)
-    todo = jobs_for(names, kitchens, first, given)
+    todo = jobs_for(names, kitchens, first, given, memory if keep_observations else None)
     for job in todo[:1]:
         job.config(first)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:
