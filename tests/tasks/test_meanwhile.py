@@ -133,9 +133,7 @@ def test_a_change_is_one_thing(table: dict[str, str], message: str) -> None:
         ({"object": "Mug", "place": "Sink", "step": "pick_up(Apple)"}, "comes 0 time"),
     ],
 )
-def test_its_names_are_checked_against_plan_and_domain(
-    table: dict[str, str], message: str
-) -> None:
+def test_its_names_are_checked_against_plan_and_domain(table: dict[str, str], message: str) -> None:
     fault = parse_fault({"kind": "meanwhile", **table})
     assert knowable([fault]) == "after"
     with pytest.raises(InputError, match=message):

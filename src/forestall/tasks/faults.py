@@ -250,10 +250,10 @@ def _check_change(fault: Meanwhile, domain: Domain) -> None:
     category = domain[fault.object].name
     if fault.attribute is not None and fault.value is not None:
         check_state(category, fault.attribute, fault.value, "meanwhile", domain)
-    elif fault.place is not None and fault.place not in domain.robot.hands:
-        if not domain.accepts(fault.place, category):
-            domain[fault.place]
-            raise InputError(f"meanwhile.place: {fault.place} does not take {category}")
+        return
+    place = fault.place or ""
+    if place not in domain.robot.hands and not domain.accepts(domain[place].name, category):
+        raise InputError(f"meanwhile.place: {place} does not take {category}")
 
 
 def _canonical(subtask: Subtask, domain: Domain) -> Subtask:
