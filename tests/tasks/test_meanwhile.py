@@ -1,4 +1,4 @@
-"""Somebody else changes the world while the robot works: in every world, and only as far as it can."""
+"""Somebody else changes the world while the robot works, in every world and as far as it can."""
 
 from __future__ import annotations
 
