@@ -57,16 +57,24 @@ class FaultyEnvironment:
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
         self._mistaken: set[int] = set()
+        self._undone = 0
 
     def reset(self, seed: int) -> None:
         """Reset the world and arm every fault again."""
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
         self._mistaken = set()
+        self._undone = 0
         self._inner.reset(seed)
-        for fault in self._faults:
+        for index, fault in enumerate(self._faults):
             if fault.step is None:
                 self._meddle(fault)
+                self._done[index] += 1
+
+    @property
+    def idle(self) -> int:
+        """How many faults have not happened so far, or could not."""
+        return self._done.count(0) + self._undone
 
     def scan(self, thorough: bool = False) -> Observation:
         """As the wrapped environment."""
@@ -116,10 +124,11 @@ class FaultyEnvironment:
         """Somebody else changes the world, as far as it can be done."""
         thing, place = str(getattr(fault, "object", "")), getattr(fault, "place", None)
         if place is not None:
-            self._disturbance.rearrange(thing, place)
+            happened = self._disturbance.rearrange(thing, place)
         else:
             changed = str(getattr(fault, "attribute", "")), str(getattr(fault, "value", ""))
-            self._disturbance.alter(thing, *changed)
+            happened = self._disturbance.alter(thing, *changed)
+        self._undone += not happened
 
     def _lets_go(self, subtask: Subtask) -> bool:
         """Whether a skill puts what the hand holds somewhere."""

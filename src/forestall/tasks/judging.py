@@ -17,6 +17,7 @@ from forestall.errors import ForestallError
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.seams import OracleView, WorldPart
+from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, wrap
 from forestall.tasks.files import LoadedTask, Scenario
 from forestall.tasks.goals import TruthGoalChecker, irreversible
@@ -48,6 +49,8 @@ class Played:
         refused: (position in the plan, reason) of every refusal.
         harmed: the first step that did what must never happen, None where nothing did.
         seen: for each step the part of the true scene that is compared before it, if asked for.
+        visible: the first step before which what is watched is in view (the number of steps where
+            it never is); 0 if nothing is.
         problem: why the start could not be built; then nothing else is told.
     """
 
@@ -56,6 +59,7 @@ class Played:
     refused: tuple[tuple[int, str], ...] = ()
     harmed: int | None = None
     seen: tuple[Seen, ...] = ()
+    visible: int = 0
     problem: str = ""
 
 
@@ -65,6 +69,7 @@ def play(
     scenario: Scenario | None,
     seed: int,
     looking: bool = False,
+    watch: Sequence[str] = (),
 ) -> Played:
     """Play a task with a scenario's faults in one room.
 
@@ -74,6 +79,7 @@ def play(
         scenario: what is different; None for the undisturbed task.
         seed: of the room.
         looking: whether to keep what is compared before each step.
+        watch: ("thing", name) or ("inside", container): what `visible` is about.
     """
     task, domain = loaded.task, loaded.domain
     faults = () if scenario is None else scenario.faults
@@ -85,7 +91,10 @@ def play(
             env = wrap(opened.environment, faults, opened.disturbance, domain)
             env.reset(seed)
             refused, ends, seen = [], [], []
+            visible = None if watch else 0
             for at, step in enumerate(plan):
+                if visible is None and _in_view(opened.oracle.truth(), watch, domain):
+                    visible = at
                 if looking:
                     seen.append(compared(opened.oracle.truth(), step, domain))
                 outcome = env.execute(step)
@@ -96,7 +105,10 @@ def play(
             harmed = _first_harm(loaded, opened.oracle, ends)
     except ForestallError as error:
         return Played(False, problem=str(error))
-    return Played(success, failures, tuple(refused), harmed, tuple(seen))
+    idle = env.idle if isinstance(env, FaultyEnvironment) else 0
+    problem = f"{idle} fault(s) did not happen" if idle else ""
+    visible = len(plan) if visible is None else visible
+    return Played(success, failures, tuple(refused), harmed, tuple(seen), visible, problem)
 
 
 def label(plays: Sequence[Played]) -> Label:
@@ -117,6 +129,13 @@ def compared(truth: SceneGraph, step: Subtask, domain: Domain) -> Seen:
     relations = {(r.predicate, r.subject, r.object) for r in scoped.relations}
     relations = {r for r in relations if r[1] not in hidden}
     return frozenset({("step", str(step)), *facts, *relations})
+
+
+def _in_view(graph: SceneGraph, watch: Sequence[str], domain: Domain) -> bool:
+    sort, name = watch
+    if sort == "inside":
+        return not _is_shut(graph, name, domain)
+    return graph.get(name) is not None and not _shut_away(graph, name, domain)
 
 
 def differs(one: Played, other: Played) -> bool:
