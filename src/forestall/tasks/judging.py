@@ -50,7 +50,7 @@ class Played:
         harmed: the first step that did what must never happen, None where nothing did.
         seen: for each step the part of the true scene that is compared before it, if asked for.
         visible: the first step before which what is watched is in view (the number of steps where
-            it never is); 0 if nothing is.
+            it never is); `since` if nothing is.
         problem: why the start could not be built; then nothing else is told.
     """
 
@@ -70,6 +70,7 @@ def play(
     seed: int,
     looking: bool = False,
     watch: Sequence[str] = (),
+    since: int = 0,
 ) -> Played:
     """Play a task with a scenario's faults in one room.
 
@@ -80,6 +81,7 @@ def play(
         seed: of the room.
         looking: whether to keep what is compared before each step.
         watch: ("thing", name) or ("inside", container): what `visible` is about.
+        since: the first step before which it counts.
     """
     task, domain = loaded.task, loaded.domain
     faults = () if scenario is None else scenario.faults
@@ -91,9 +93,13 @@ def play(
             env = wrap(opened.environment, faults, opened.disturbance, domain)
             env.reset(seed)
             refused, ends, seen = [], [], []
-            visible = None if watch else 0
+            visible = None if watch else since
             for at, step in enumerate(plan):
-                if visible is None and _in_view(opened.oracle.truth(), watch, domain):
+                if (
+                    visible is None
+                    and at >= since
+                    and _in_view(opened.oracle.truth(), watch, domain)
+                ):
                     visible = at
                 if looking:
                     seen.append(compared(opened.oracle.truth(), step, domain))
@@ -131,16 +137,22 @@ def compared(truth: SceneGraph, step: Subtask, domain: Domain) -> Seen:
     return frozenset({("step", str(step)), *facts, *relations})
 
 
+def fixtures_in(world: WorldPart, loaded: LoadedTask, seed: int) -> set[str]:
+    """Categories of the fixtures that a task's room has."""
+    domain = loaded.domain
+    with world.open(loaded.task.scene, domain) as opened:
+        opened.environment.reset(seed)
+        nodes = opened.oracle.truth().nodes
+    ground = set(domain.tagged(domain.roles.ground))
+    fixtures = {n.category for n in nodes if domain.is_a(n.category, domain.roles.fixture)}
+    return fixtures - ground
+
+
 def _in_view(graph: SceneGraph, watch: Sequence[str], domain: Domain) -> bool:
     sort, name = watch
     if sort == "inside":
         return not _is_shut(graph, name, domain)
     return graph.get(name) is not None and not _shut_away(graph, name, domain)
-
-
-def differs(one: Played, other: Played) -> bool:
-    """Whether what is compared before some step differs between two plays."""
-    return one.seen != other.seen
 
 
 def _shut_away(graph: SceneGraph, name: str, domain: Domain) -> bool:

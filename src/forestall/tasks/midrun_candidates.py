@@ -34,9 +34,9 @@ class MidrunComposer(Composed):
             if not domain.is_a(need.category, domain.roles.movable):
                 continue
             for place in self.room:
-                if not domain.accepts(place, need.category) or domain.is_a(
-                    place, domain.roles.numbered
-                ):
+                avoided = any(domain.is_a(place, tag) for tag in domain.roles.avoid)
+                numbered = domain.is_a(place, domain.roles.numbered)
+                if avoided or numbered or not domain.accepts(place, need.category):
                     continue
                 kind = "put-away" if domain.encloses(place) else "moved"
                 told = f"somebody puts {self.the(need.id)} {self.to(place)}"

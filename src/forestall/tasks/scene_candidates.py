@@ -66,7 +66,8 @@ class SceneComposer(Composed):
                     watch=watch,
                 )
             for place in self.room:
-                if place in need.places or not domain.accepts(place, need.category):
+                avoided = any(domain.is_a(place, tag) for tag in domain.roles.avoid)
+                if avoided or place in need.places or not domain.accepts(place, need.category):
                     continue
                 move = MoveObject(object=need.id, places=(place,))
                 where = f"{self.the(need.id)} {self.at(place)}"
@@ -77,7 +78,7 @@ class SceneComposer(Composed):
                         self.task.name,
                         "elsewhere",
                         begun(where),
-                        begun(f"{where}, not where it usually is."),
+                        begun(f"{self.the(need.id)} is {self.at(place)}, not where it usually is."),
                         (move,),
                         watch=("thing", need.id),
                     )
@@ -113,7 +114,7 @@ class SceneComposer(Composed):
                 front = f"{self.a(other)} in front of {self.the(need.id)}"
                 yield Candidate(
                     self.task.name,
-                    "blocked",
+                    "in-front",
                     begun(front),
                     begun(f"{self.a(other)} stands in front of {self.the(need.id)}."),
                     (AddObject(category=other, in_front_of=need.id),),
@@ -131,12 +132,11 @@ class SceneComposer(Composed):
             ]:
                 states = {attribute: value} if attribute else {}
                 like = f", {domain.say(attribute, value)}" if attribute else ""
-                twin = f", one {domain.say(attribute, value)}" if attribute else ""
                 yield Candidate(
                     self.task.name,
                     "second-other" if attribute else "second",
                     f"A second {self.words(need.id)}{like}",
-                    f"There are two {self.words(need.id)}s{twin}; which one is used is left open.",
+                    f"There is a second {self.words(need.id)}{like}; the robot may take either.",
                     (AddObject(category=need.category, places=places, states=states),),
                     watch=("thing", f"{need.category}-2"),
                 )
