@@ -34,7 +34,7 @@ def graph_file(folder: Path, name: str, *, bowl: bool) -> str:
 def test_listings_are_complete(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["tasks", "--json"]) == 0
     tasks = json.loads(capsys.readouterr().out)
-    assert len(tasks) == 13 and all(t["plan"] and t["literals"] for t in tasks)
+    assert len(tasks) == 16 and all(t["plan"] and t["literals"] for t in tasks)
     assert call(["scenarios", "--task", "heat-potato", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert {r["task"] for r in rows} == {"heat-potato"} and len(rows) >= 3

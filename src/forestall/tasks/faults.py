@@ -24,8 +24,10 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.seams import Disturbance, Environment
 from forestall.tasks.execution_faults import FaultyEnvironment
+from forestall.tasks.eyes import SharedEyes
 from forestall.tasks.scene_faults import FaultTable, SceneFault, check_state
 from forestall.tasks.scene_faults import apply_scene_faults as apply_scene_faults  # noqa: PLC0414
+from forestall.types.facts import is_instance
 from forestall.types.plan import Plan, Subtask, same_step
 
 
@@ -119,6 +121,9 @@ class WrongObject(_Execution):
 
     kind: Literal["wrong_object"] = "wrong_object"
     acts_on: str
+    shared: bool = Field(
+        default=False, description="whether who watches the robot sees with its eyes, too"
+    )
 
 
 class WrongReceptacle(_Execution):
@@ -270,7 +275,15 @@ def wrap(
     chosen = [f for f in faults if isinstance(f, ExecutionFault)]
     if not chosen:
         return environment
-    return FaultyEnvironment(environment, chosen, disturbance, domain)
+    faulty = FaultyEnvironment(environment, chosen, disturbance, domain)
+    mistaken = {
+        (f.acts_on if is_instance(f.acts_on) else f"{domain[f.acts_on].name}-1"): domain[
+            Subtask.parse(f.step).args[0]
+        ].name
+        for f in chosen
+        if isinstance(f, WrongObject) and f.shared
+    }
+    return SharedEyes(faulty, mistaken, domain) if mistaken else faulty
 
 
 def _find(steps: Sequence[Subtask], text: str, occurrence: int, field: str) -> int:

@@ -18,6 +18,7 @@ from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.seams import OracleView, WorldPart
 from forestall.tasks.execution_faults import FaultyEnvironment
+from forestall.tasks.eyes import SharedEyes
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, wrap
 from forestall.tasks.files import LoadedTask, Scenario
 from forestall.tasks.goals import TruthGoalChecker, irreversible
@@ -111,7 +112,7 @@ def play(
             harmed = _first_harm(loaded, opened.oracle, ends)
     except ForestallError as error:
         return Played(False, problem=str(error))
-    idle = env.idle if isinstance(env, FaultyEnvironment) else 0
+    idle = env.idle if isinstance(env, FaultyEnvironment | SharedEyes) else 0
     problem = f"{idle} fault(s) did not happen" if idle else ""
     visible = len(plan) if visible is None else visible
     return Played(success, failures, tuple(refused), harmed, tuple(seen), visible, problem)
