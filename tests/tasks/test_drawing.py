@@ -19,6 +19,7 @@ from forestall.tasks.scene_candidates import SceneComposer
 from forestall.tasks.schemas import ScenarioSetFile
 from forestall.tasks.writing import set_file
 from forestall.testing.part import SymbolicWorlds
+from forestall.types.facts import Literal
 from forestall.types.plan import Plan
 
 WORLD = SymbolicWorlds()
@@ -129,6 +130,21 @@ def test_rooms_must_agree(outcomes: list[bool], expected: Label) -> None:
     assert label([*(Played(o) for o in outcomes), Played(False, problem="no room")]) is (
         Label.IMPOSSIBLE
     )
+
+
+def test_what_nobody_could_have_prevented_or_spoils_something_else_is_neither() -> None:
+    assert label([Played(False, harmed=0, lost=True)]) is Label.LOST
+    assert label([Played(False, harmed=2, visible=3)]) is Label.LOST
+    assert label([Played(False, harmed=3, visible=3)]) is Label.FAILS
+    spoiled = frozenset({Literal("spoiled", ("Tomato-1",))})
+    assert label([Played(True), Played(True, history=spoiled)]) is Label.SPOILS
+    loaded = load_task("water-plant")
+    faults = (parse_fault({"kind": "add_object", "category": "Tomato", "places": ["Pot"]}),)
+    played = play(WORLD, loaded, Scenario("x", "water-plant", "", "", "", faults), 1)
+    assert played.success and played.history == spoiled
+    dirty = (parse_fault({"kind": "set_state", "object": "HousePlant", "attribute": "filled",
+                          "value": "wine"}),)  # fmt: skip
+    assert play(WORLD, loaded, Scenario("x", "water-plant", "", "", "", dirty), 1).lost
 
 
 def test_known_and_effect_are_steps_of_the_plan() -> None:

@@ -29,7 +29,7 @@ from forestall.types.plan import Plan
 
 SIZES = {
     "everyday": 22,
-    "composed": 12,
+    "composed": 13,
     "midrun": 8,
     "double": 5,
     "planner": 12,
@@ -168,11 +168,9 @@ class Drawer:
                     candidate.since,
                 )
             )
-            if label(plays) in (Label.MIXED, Label.IMPOSSIBLE) or wanted not in (
-                None,
-                label(plays),
-            ):
-                return label(plays), scenario
+            so_far = label(plays)
+            if so_far not in (Label.SUCCEEDS, Label.FAILS) or wanted not in (None, so_far):
+                return so_far, scenario
         known = effect = None
         if label(plays) is Label.FAILS:
             known, effect = moments(self._plan_of(candidate), plays)

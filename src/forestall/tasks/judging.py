@@ -16,7 +16,7 @@ from forestall.domain.truth import truth as truth_of
 from forestall.errors import ForestallError
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
-from forestall.seams import OracleView, WorldPart
+from forestall.seams import WorldPart
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.eyes import SharedEyes
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, wrap
@@ -36,6 +36,8 @@ class Label(StrEnum):
 
     FAILS = "fails"
     SUCCEEDS = "succeeds"
+    SPOILS = "succeeds and spoils something else"
+    LOST = "is lost before anybody could do anything"
     MIXED = "differs from room to room"
     IMPOSSIBLE = "cannot be built"
 
@@ -52,6 +54,8 @@ class Played:
         seen: for each step the part of the true scene that is compared before it, if asked for.
         visible: the first step before which what is watched is in view (the number of steps where
             it never is); `since` if nothing is.
+        lost: whether the harm was there from the start.
+        history: what has happened that cannot be undone, whether or not the goal is about it.
         problem: why the start could not be built; then nothing else is told.
     """
 
@@ -61,6 +65,8 @@ class Played:
     harmed: int | None = None
     seen: tuple[Seen, ...] = ()
     visible: int = 0
+    lost: bool = False
+    history: frozenset[Literal] = frozenset()
     problem: str = ""
 
 
@@ -109,13 +115,24 @@ def play(
                 if outcome.status is SkillStatus.REFUSED:
                     refused.append((at, outcome.reason))
             success, _, failures = TruthGoalChecker(domain).check(task.goal, opened.oracle)
-            harmed = _first_harm(loaded, opened.oracle, ends)
+            harms = irreversible(task.goal, opened.oracle, domain)
+            history = opened.oracle.history()
     except ForestallError as error:
         return Played(False, problem=str(error))
     idle = env.idle if isinstance(env, FaultyEnvironment | SharedEyes) else 0
     problem = f"{idle} fault(s) did not happen" if idle else ""
     visible = len(plan) if visible is None else visible
-    return Played(success, failures, tuple(refused), harmed, tuple(seen), visible, problem)
+    return Played(
+        success,
+        failures,
+        tuple(refused),
+        _step_at(harms[0][0], ends) if harms else None,
+        tuple(seen),
+        visible,
+        bool(harms) and harms[0][0] <= 0.0,
+        history,
+        problem,
+    )
 
 
 def label(plays: Sequence[Played]) -> Label:
@@ -125,7 +142,10 @@ def label(plays: Sequence[Played]) -> Label:
     outcomes = {p.success for p in plays}
     if len(outcomes) != 1:
         return Label.MIXED
-    return Label.SUCCEEDS if outcomes == {True} else Label.FAILS
+    if outcomes == {True}:
+        return Label.SPOILS if any(p.history for p in plays) else Label.SUCCEEDS
+    done = any(p.lost or (p.harmed is not None and p.harmed < p.visible) for p in plays)
+    return Label.LOST if done else Label.FAILS
 
 
 def compared(truth: SceneGraph, step: Subtask, domain: Domain) -> Seen:
@@ -171,9 +191,6 @@ def _is_shut(graph: SceneGraph, name: str, domain: Domain) -> bool:
     return truth_of(graph, Literal(shut, (name,)), domain) is Truth.TRUE
 
 
-def _first_harm(loaded: LoadedTask, oracle: OracleView, ends: Sequence[float]) -> int | None:
-    """The step during which something that must never happen first happened."""
-    found = irreversible(loaded.task.goal, oracle, loaded.domain)
-    if not found:
-        return None
-    return next((k for k, end in enumerate(ends) if found[0][0] <= end), len(ends) - 1)
+def _step_at(time_s: float, ends: Sequence[float]) -> int:
+    """The step during which something happened, given when each ended."""
+    return next((k for k, end in enumerate(ends) if time_s <= end), len(ends) - 1)

@@ -97,7 +97,7 @@ class MidrunComposer(Composed):
             f"While the robot works, after {step}, {told}.",
             (*more, then),
             since=at + 1,
-            watch=("thing", change.object),
+            watch=() if kind in ("put-away", "moved") else ("thing", change.object),
         )
 
     def _slips(self, plan: Plan) -> Iterator[Candidate]:

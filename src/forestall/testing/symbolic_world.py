@@ -172,6 +172,8 @@ class SymbolicWorld:
             kind = after.kinds[name]
             free = [p for p in state.matches(place) if domain.accepts(p, kind) and p != name]
             free = [p for p in free if self._has_room(p) and not self._is_within(p, name)]
+            here = state.place(name)
+            free = [p for p in free if here is None or p != here.parent]
             if not free:
                 return False
             after.add((relation_at(domain, kind, free[0]), name, free[0]))

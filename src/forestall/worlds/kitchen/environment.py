@@ -277,7 +277,8 @@ class KitchenEnvironment:
                 where = resolve_receptacle(household, place, name)
                 full = why_no_room(household, name, where) is not None
                 inside = name in (where, *household.ancestors(where))
-                if full or inside or not household.catalogue.accepts(where, name):
+                there = household.parent(name) == where
+                if there or full or inside or not household.catalogue.accepts(where, name):
                     return False
                 household.put(name, where)
                 effects.arrived(household, name, where)
