@@ -9,7 +9,14 @@ import pytest
 from forestall.errors import InputError
 from forestall.tasks.files import LoadedTask, Scenario, load_task, task_names
 from forestall.tasks.judging import play
-from forestall.tasks.variation import CHANCES, Variation, fixtures_of, variations, vary
+from forestall.tasks.variation import (
+    CHANCES,
+    Variation,
+    fixtures_of,
+    room_fixtures,
+    variations,
+    vary,
+)
 from forestall.testing.part import SymbolicWorlds
 from forestall.types.plan import Plan
 
@@ -75,6 +82,13 @@ def test_only_what_the_room_has_is_used() -> None:
         one = vary(loaded.task, loaded.domain, seed, only=["place", "detour"])
         named = {a.rpartition("-")[0] or a for s in one.plan for a in s.args}
         assert named <= own | {"Potato", "Plate"}
+
+
+def test_a_room_is_known_by_what_its_tasks_name() -> None:
+    kitchen = room_fixtures(load_task("heat-potato"))
+    assert {"Fridge", "Toaster", "Sink", "StoveBurner"} <= kitchen
+    assert "Television" not in kitchen
+    assert "Television" in room_fixtures(load_task("switch-devices"))
 
 
 @pytest.mark.parametrize("count", [0, 33])

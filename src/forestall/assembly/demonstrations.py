@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import forestall
 from forestall.assembly.configuration import Choice, Given, RunConfig, digest_of, run_config
-from forestall.assembly.make import prepare, run_episode
+from forestall.assembly.make import Prepared, prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.domain.model import Domain
@@ -38,6 +38,8 @@ from forestall.kinds import (
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import SqliteStore, open_store
 from forestall.processes import pool
+from forestall.tasks.files import LoadedTask, Scenario
+from forestall.tasks.variation import room_fixtures, vary
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
 from forestall.types.observation import Observation
@@ -63,12 +65,14 @@ class RecordingJob:
         first_seed: of the range.
         given: what was said about the parts; only `RECORDED` ones and the domain count.
         tries: length of the range.
+        variant: which way to do the task, see `variation.vary`; 0 is the nominal plan.
     """
 
     task: str
     first_seed: int
     given: Given = field(default_factory=Given)
     tries: int = TRIES
+    variant: int = 0
 
     def config(self, seed: int) -> RunConfig:
         """The nominal run of one seed, with all that a demonstration keeps."""
@@ -87,10 +91,15 @@ def jobs_for(
     kitchens: int = KITCHENS_PER_TASK,
     seed: int = DEMONSTRATION_SEEDS,
     given: Given | None = None,
+    varied: bool = False,
 ) -> list[RecordingJob]:
-    """`kitchens` jobs for each task, each with seeds of its own."""
+    """`kitchens` jobs for each task, each with seeds of its own; `varied`: as people do them."""
     said = given or Given()
-    return [RecordingJob(task, seed + 10 * k, said) for task in tasks for k in range(kitchens)]
+    return [
+        RecordingJob(task, seed + 10 * k, said, variant=k if varied else 0)
+        for task in tasks
+        for k in range(kitchens)
+    ]
 
 
 def record_one(job: RecordingJob) -> Demonstration:
@@ -102,7 +111,7 @@ def record_one(job: RecordingJob) -> Demonstration:
     why: tuple[str, ...] = ()
     for seed in range(job.first_seed, job.first_seed + job.tries):
         config = job.config(seed)
-        prepared = prepare(config)
+        prepared = as_people_do(prepare(config), job.variant)
         viewer = make_viewer(config, prepared.loaded.domain)
         record = run_episode(prepared, None)
         demonstration = demonstration_from(record, forestall.__version__, view_of=viewer)
@@ -113,6 +122,18 @@ def record_one(job: RecordingJob) -> Demonstration:
         f"no successful run of {job.task} in seeds {job.first_seed} to "
         f"{job.first_seed + job.tries - 1}: {'; '.join(why)}"
     )
+
+
+def as_people_do(prepared: Prepared, variant: int) -> Prepared:
+    """A run of another way to do its task, slips included; the same run for variant 0."""
+    if not variant:
+        return prepared
+    loaded = prepared.loaded
+    way = vary(loaded.task, loaded.domain, variant, fixtures=room_fixtures(loaded))
+    task = replace(loaded.task, plan=way.plan, scene=way.scene)
+    slips = Scenario("slips", task.name, "", "slips", "; ".join(way.varied), way.slips)
+    scenario = slips if way.slips else None
+    return replace(prepared, loaded=LoadedTask(task, loaded.domain), scenario=scenario)
 
 
 def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord], View | None]:
@@ -203,7 +224,8 @@ def keyed(jobs: Sequence[RecordingJob]) -> dict[str, RecordingJob]:
         said = repr((job.task, job.given))
         if said not in digests:
             digests[said] = _content(job.config(job.first_seed))
-        found[f"{digests[said]} {job.first_seed} {job.tries}"] = job
+        way = f" variant {job.variant}" if job.variant else ""
+        found[f"{digests[said]} {job.first_seed} {job.tries}{way}"] = job
     return found
 
 

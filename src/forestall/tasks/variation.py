@@ -19,6 +19,7 @@ from forestall.domain.schema import Skill
 from forestall.errors import InputError
 from forestall.planning.validate import GraphValidator, observed, run
 from forestall.tasks.faults import FailedAction, Fault
+from forestall.tasks.files import LoadedTask, load_task, long_task_names, task_names
 from forestall.testing.symbolic_scene import start_scene
 from forestall.types.facts import Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
@@ -284,6 +285,16 @@ def fixtures_of(task: Task, domain: Domain) -> set[str]:
     named |= {a for x in task.goal.literals for a in x.args if not a.startswith("?")}
     categories = {category_of(domain.canonical(n)) for n in named}
     return {c for c in categories if domain.is_a(c, domain.roles.fixture)}
+
+
+def room_fixtures(loaded: LoadedTask) -> set[str]:
+    """Categories of fixtures that shipped tasks of the same domain name in the same room."""
+    found: set[str] = set()
+    for name in (*task_names(loaded.domain.name), *long_task_names(loaded.domain.name)):
+        other = load_task(name)
+        if other.task.scene.room == loaded.task.scene.room:
+            found |= fixtures_of(other.task, other.domain)
+    return found
 
 
 def takes_up(domain: Domain, step: Subtask) -> bool:
