@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from forestall.errors import InputError
+from forestall.tasks.faults import FailedAction
 from forestall.tasks.files import LoadedTask, Scenario, load_task, task_names
 from forestall.tasks.judging import play
 from forestall.tasks.variation import (
@@ -60,6 +61,7 @@ def test_a_slip_is_mended_by_doing_the_step_again() -> None:
     steps = one.plan.subtasks
     again = [k for k in range(1, len(steps)) if steps[k] == steps[k - 1]]
     assert len(again) == 1 == len(one.slips)
+    assert isinstance(one.slips[0], FailedAction)
     assert one.slips[0].step == str(steps[again[0]])
     mended = Plan((*steps[: again[0]], *steps[again[0] + 1 :]), one.plan.goal)
     assert mended == loaded.task.plan

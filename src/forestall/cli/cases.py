@@ -192,7 +192,9 @@ def _counts(sets: list[str], by_kind: bool) -> list[dict[str, object]]:
     for of in sets:
         found = cases_of(of, "development")
         told = [None if c.scenario is None else load_scenario(c.scenario) for c in found]
-        kinds = sorted({s.kind for s in told if s is not None}) if by_kind else []
+        kinds: list[str | None] = []
+        if by_kind:
+            kinds += sorted({s.kind for s in told if s is not None})
         for kind in kinds or [None]:
             some = [
                 (c, s)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import TypeVar
 
-from forestall.assembly.configuration import run_config
+from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.make import make_world
 from forestall.seams import WorldPart
 from forestall.statistics.cases import FURTHER_SPLITS, ROUNDS, Case, room
@@ -88,8 +88,8 @@ def _development_rooms(place: int) -> list[int]:
 
 
 def _world(loaded: LoadedTask, task: str, name: str = "") -> WorldPart:
-    named = {"world": name} if name else {}
-    return make_world(run_config(task, strategy="none", **named), loaded.domain)
+    given = Given.named({"strategy": "none"} | ({"world": name} if name else {}))
+    return make_world(run_config(task, given=given), loaded.domain)
 
 
 def _spread(do: Callable[[T], R], what: Sequence[T], jobs: int) -> Iterator[R]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from forestall.seams import WorldPart
 from forestall.tasks.composing import Candidate, begun
-from forestall.tasks.faults import PlanFault, ReplacePlan, apply_plan_faults
+from forestall.tasks.faults import ReplacePlan, apply_plan_faults
 from forestall.tasks.files import END, LoadedTask, Scenario
 from forestall.tasks.judging import Label, Played, fixtures_in, label, play
 from forestall.tasks.midrun_candidates import MidrunComposer
@@ -109,7 +109,7 @@ class Drawer:
                 del waiting[kind]
             found, scenario = self.judge(candidate, of, len(placed), wanted)
             self.drawn.labels[of, candidate.kind, found] += 1
-            if found is not wanted or any(s.faults == scenario.faults for s in placed):
+            if found is not wanted or any(s.cause == scenario.cause for s in placed):
                 continue
             unseen = sum(s.compared is False for s in placed)
             if of == "everyday" and not scenario.compared and unseen >= UNSEEN_SHARE * count:
@@ -197,7 +197,7 @@ class Drawer:
 
     def _pairs(self) -> Iterator[Candidate]:
         """Two that fail each by itself, of different kinds."""
-        pool = [c for c in self._failing if not any(isinstance(f, PlanFault) for f in c.faults)]
+        pool = [c for c in self._failing if c.kind != "missing"]
         pairs = [(a, b) for k, a in enumerate(pool) for b in pool[k + 1 :] if a.kind != b.kind]
         for k in self._rng.permutation(len(pairs)):
             one, other = sorted(pairs[int(k)], key=lambda c: c.since)

@@ -4,7 +4,7 @@ Called by `drawing`, which plays each; calls the domain. The kinds are those of 
 Interface (Li et al., NeurIPS 2024 Datasets and Benchmarks, arXiv 2410.07166), and so are the rates:
 the table "Trajectory evaluation results for action sequencing" on its project page gives, for 18
 models in two simulators, the share of plans with each error; `RATES` are its means, in per cent. A
-plan that runs and misses the goal (execution rate minus goal rate, 7.9 on average) names a wrong
+plan that runs and misses the goal (execution rate minus goal rate, 8.0 on average) names a wrong
 object or place here; half and half is our choice, as are the thirds of missing steps that are whole
 errands. Errors of parsing and of the number of arguments (3.7 together) are not drawn: such a plan
 is refused when it is read; nor are invented skills, for the same reason. RoboFail's failures of

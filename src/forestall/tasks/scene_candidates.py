@@ -99,7 +99,7 @@ class SceneComposer(Composed):
                         "put-away-open",
                         begun(f"{where}, open"),
                         begun(f"{told} open."),
-                        (move, opened),
+                        (MoveObject(object=need.id, places=(f"{place}-1",)), opened),
                         watch=("thing", need.id),
                     )
 
