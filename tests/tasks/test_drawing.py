@@ -58,7 +58,7 @@ def test_what_is_put_away_is_in_something_shut_or_open() -> None:
     shut, is_open = by_kind["put-away"], by_kind["put-away-open"]
     assert [f.kind for f in shut.faults] == ["move_object"]
     assert [f.kind for f in is_open.faults] == ["move_object", "set_state"]
-    assert is_open.faults[0] == MoveObject(object="Plate-1", places=("Cabinet-1",))
+    assert is_open.faults[0] == MoveObject(object="Plate-1", places=("Microwave-1",))
     assert isinstance(is_open.faults[1], SetState) and is_open.faults[1].value == "open"
     tried = [Scenario("x", "heat-potato", "", "", "", c.faults) for c in (shut, is_open)]
     assert [play(WORLD, loaded, s, 1).success for s in tried] == [False, True]
