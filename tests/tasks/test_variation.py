@@ -51,7 +51,7 @@ def test_every_sort_of_difference_is_found(sort: str) -> None:
     assert [v.split(":")[0] for v in one.varied] == [sort]
     assert one.plan != loaded.task.plan
     assert bool(one.slips) == (sort == "slip")
-    assert (one.scene != loaded.task.scene) == (sort == "tool")
+    assert (one.scene != loaded.task.scene) == (sort == "substitute")
     assert _reaches(name, one, seed=7)
 
 

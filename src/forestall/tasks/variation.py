@@ -35,7 +35,7 @@ STARTS = 3
 
 TRIES = 40
 
-CHANCES = {"order": 0.6, "place": 0.5, "tool": 0.35, "detour": 0.35, "slip": 0.2}
+CHANCES = {"order": 0.6, "place": 0.5, "substitute": 0.35, "detour": 0.35, "slip": 0.2}
 """How often a variant has each sort of difference (our choice: most demonstrations have one)."""
 
 Steps = tuple[Subtask, ...]
@@ -128,7 +128,7 @@ class _Varying:
         ways: dict[str, Callable[[], Iterator[tuple[Steps, SceneNeeds, str]]]] = {
             "order": self._orders,
             "place": self._places,
-            "tool": self._tools,
+            "substitute": self._tools,
             "detour": self._detours,
         }
         if sort == "slip":
