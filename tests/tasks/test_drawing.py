@@ -149,6 +149,15 @@ def test_what_nobody_could_have_prevented_or_spoils_something_else_is_neither() 
     assert play(WORLD, loaded, Scenario("x", "water-plant", "", "", "", dirty), 1).lost
 
 
+def test_the_step_that_does_the_harm_is_the_one_that_is_named() -> None:
+    loaded = load_task("store-egg")
+    table = {"kind": "set_state", "object": "Bowl", "attribute": "filled", "value": "wine"}
+    wine = Scenario("x", "store-egg", "", "", "", (parse_fault(table),))
+    played = play(WORLD, loaded, wine, 1)
+    assert played.harmed is not None and not played.lost
+    assert str(loaded.task.plan.subtasks[played.harmed]) == "put_in(Egg, Bowl)"
+
+
 def test_known_and_effect_are_steps_of_the_plan() -> None:
     plan = Plan.parse(["go(A)", "take(A)", "go(A)", "take(A)"])
     seen = Played(False, refused=((1, ""), (3, "")), visible=2)

@@ -172,3 +172,8 @@ def counted(plan: Plan, at: int) -> tuple[Subtask, int]:
     """A step, and which of its equals it is."""
     step = plan.subtasks[at]
     return step, sum(s == step for s in plan.subtasks[: at + 1])
+
+
+def named(step: Subtask, number: int) -> str:
+    """A step in a text, with which of its equals it is where it is not the first."""
+    return str(step) if number == 1 else f"{step} #{number}"

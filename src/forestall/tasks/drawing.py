@@ -16,7 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from forestall.seams import WorldPart
-from forestall.tasks.composing import Candidate, begun
+from forestall.tasks.composing import Candidate, begun, counted, named
 from forestall.tasks.faults import ReplacePlan, apply_plan_faults
 from forestall.tasks.files import END, LoadedTask, Scenario
 from forestall.tasks.judging import Label, Played, fixtures_in, label, play
@@ -94,6 +94,7 @@ class Drawer:
         self.plans("planner", SIZES["planner"])
         again = [c for _ in range(3) for c in self._midrun() if c.kind in KIND_ONES]
         pool = [*scene, *(c for c in midrun if c.kind not in SLIPS), *again, *self._ways()]
+        pool = [c for c in pool if c.kind not in self._accidents()]
         self.fill("everyday", pool, Label.SUCCEEDS, SIZES["everyday"])
         return self.drawn
 
@@ -188,6 +189,14 @@ class Drawer:
         )
         return label(plays), told
 
+    def _accidents(self) -> set[str]:
+        """Kinds of states that nothing in the domain brings about: nobody means them to be."""
+        domain = self.loaded.domain
+        effects = [e for s in domain.skills.values() for e in s.effects]
+        effects += [e for p in domain.processes for e in p.effects]
+        changed = {f.predicate for e in effects for f in e.facts}
+        return {f"state-{a}" for a in domain.attributes if a not in changed}
+
     def _plan_of(self, candidate: Candidate) -> Plan:
         return apply_plan_faults(self.loaded.task.plan, candidate.faults, self.loaded.domain)
 
@@ -258,6 +267,4 @@ def _text(plan: Plan, at: int) -> str:
     """A step of a plan as `known` and `effect` name it."""
     if at >= len(plan):
         return END
-    step = plan.subtasks[at]
-    number = sum(s == step for s in plan.subtasks[: at + 1])
-    return str(step) if number == 1 else f"{step} #{number}"
+    return named(*counted(plan, at))

@@ -16,7 +16,7 @@ from forestall.domain.truth import truth as truth_of
 from forestall.errors import ForestallError
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
-from forestall.seams import WorldPart
+from forestall.seams import OracleView, WorldPart
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.eyes import SharedEyes
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, wrap
@@ -99,7 +99,8 @@ def play(
         with world.open(needs, domain) as opened:
             env = wrap(opened.environment, faults, opened.disturbance, domain)
             env.reset(seed)
-            refused, ends, seen = [], [], []
+            refused, seen = [], []
+            told = [len(opened.oracle.events())]
             visible = None if watch else since
             for at, step in enumerate(plan):
                 if (
@@ -111,11 +112,11 @@ def play(
                 if looking:
                     seen.append(compared(opened.oracle.truth(), step, domain))
                 outcome = env.execute(step)
-                ends.append(env.time_s)
+                told.append(len(opened.oracle.events()))
                 if outcome.status is SkillStatus.REFUSED:
                     refused.append((at, outcome.reason))
             success, _, failures = TruthGoalChecker(domain).check(task.goal, opened.oracle)
-            harms = irreversible(task.goal, opened.oracle, domain)
+            harmed = _first_harm(loaded, opened.oracle, told)
             history = opened.oracle.history()
     except ForestallError as error:
         return Played(False, problem=str(error))
@@ -126,10 +127,10 @@ def play(
         success,
         failures,
         tuple(refused),
-        _step_at(harms[0][0], ends) if harms else None,
+        None if harmed is None else max(harmed, 0),
         tuple(seen),
         visible,
-        bool(harms) and harms[0][0] <= 0.0,
+        harmed == -1,
         history,
         problem,
     )
@@ -191,6 +192,19 @@ def _is_shut(graph: SceneGraph, name: str, domain: Domain) -> bool:
     return truth_of(graph, Literal(shut, (name,)), domain) is Truth.TRUE
 
 
-def _step_at(time_s: float, ends: Sequence[float]) -> int:
-    """The step during which something happened, given when each ended."""
-    return next((k for k, end in enumerate(ends) if time_s <= end), len(ends) - 1)
+def _first_harm(loaded: LoadedTask, oracle: OracleView, told: Sequence[int]) -> int | None:
+    """The step during which something that must never happen first happened; -1: before any.
+
+    Args:
+        loaded: the task.
+        oracle: after the run.
+        told: how many events there were at the start and after each step.
+    """
+    found = irreversible(loaded.task.goal, oracle, loaded.domain)
+    if not found:
+        return None
+    events = [(e.time_s, e.text) for e in oracle.events()]
+    at = min((events.index(f) for f in found if f in events), default=-1)
+    if any(f not in events for f in found):
+        return -1
+    return next((k - 1 for k, count in enumerate(told) if at < count), len(told) - 2)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from forestall.tasks.composing import Candidate, Composed, counted
+from forestall.tasks.composing import Candidate, Composed, counted, named
 from forestall.tasks.faults import Drop, FailedAction, Fault, Meanwhile
 from forestall.tasks.scene_faults import AddObject
 from forestall.types.plan import Plan
@@ -94,7 +94,7 @@ class MidrunComposer(Composed):
             self.task.name,
             kind,
             f"Meanwhile {told}"[:70],
-            f"While the robot works, after {step}, {told}.",
+            f"While the robot works, after {named(step, number)}, {told}.",
             (*more, then),
             since=at + 1,
             watch=() if kind in ("put-away", "moved") else ("thing", change.object),
@@ -109,8 +109,8 @@ class MidrunComposer(Composed):
                 yield Candidate(
                     self.task.name,
                     "failed-action",
-                    f"{step} comes to nothing",
-                    f"{step} does nothing and reports success.",
+                    f"{named(step, number)} comes to nothing",
+                    f"{named(step, number)} does nothing and reports success.",
                     (FailedAction(step=str(step), occurrence=number),),
                     since=int(at) + 1,
                 )
@@ -118,8 +118,8 @@ class MidrunComposer(Composed):
                 yield Candidate(
                     self.task.name,
                     "dropped",
-                    f"Lost during {step}",
-                    f"What the robot holds slips from its hand during {step}.",
+                    f"Lost during {named(step, number)}",
+                    f"What the robot holds slips from its hand during {named(step, number)}.",
                     (Drop(step=str(step), occurrence=number),),
                     since=int(at) + 1,
                 )
