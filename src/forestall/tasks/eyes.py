@@ -65,6 +65,10 @@ class SharedEyes:
         """Do it with what is meant."""
         return self._inner.execute(Subtask(subtask.skill, tuple(map(self._meant, subtask.args))))
 
+    def hold(self) -> None:
+        """As the wrapped environment."""
+        self._inner.hold()
+
     @property
     def time_s(self) -> float:
         """As the wrapped environment."""
