@@ -98,6 +98,15 @@ class Disturbance(Protocol):
         A hard fall breaks what is fragile.
         """
 
+    def rearrange(self, thing: str, place: str) -> bool:
+        """Somebody puts a thing that the robot does not hold at a place, or into its empty hand.
+
+        False where that cannot be done; then nothing has changed.
+        """
+
+    def alter(self, thing: str, attribute: str, value: str) -> bool:
+        """Somebody changes a state; False where the thing is not there or has it already."""
+
 
 class OpenWorld(Protocol):
     """One world made for one run, seen from its three sides."""

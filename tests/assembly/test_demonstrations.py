@@ -178,3 +178,17 @@ def test_a_cache_that_cannot_be_written_is_said_in_a_sentence(
     monkeypatch.setattr("platformdirs.user_cache_path", lambda *_, **__: Path("~/.cache"))
     with pytest.raises(ForestallError, match="no home folder for the cache: set FORESTALL_CACHE"):
         cache_dir()
+
+
+def test_varied_demonstrations_do_the_task_in_other_ways(
+    tmp_path: Path, recorded: list[RecordingJob]
+) -> None:
+    jobs = jobs_for(["fasten-plate"], kitchens=6, varied=True)
+    assert [job.variant for job in jobs] == [0, 1, 2, 3, 4, 5]
+    assert jobs[:1] == jobs_for(["fasten-plate"], kitchens=1)
+    with open_store(tmp_path / "varied.db", create=True) as store:
+        assert record_into(store, jobs, 1) == 6
+        assert record_into(store, jobs, 1) == 0
+        assert record_into(store, jobs_for(["fasten-plate"], kitchens=6), 1) == 5
+        ways = [tuple(str(s.subtask) for s in d.steps) for d in store.all()]
+    assert len(set(ways)) > 3

@@ -34,7 +34,7 @@ def graph_file(folder: Path, name: str, *, bowl: bool) -> str:
 def test_listings_are_complete(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["tasks", "--json"]) == 0
     tasks = json.loads(capsys.readouterr().out)
-    assert len(tasks) == 13 and all(t["plan"] and t["literals"] for t in tasks)
+    assert len(tasks) == 16 and all(t["plan"] and t["literals"] for t in tasks)
     assert call(["scenarios", "--task", "heat-potato", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert {r["task"] for r in rows} == {"heat-potato"} and len(rows) >= 3
@@ -133,3 +133,41 @@ def test_help_imports_nothing_heavy() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "run" in done.stdout
+
+
+def test_the_cases_of_the_experiments_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["cases", "list", "--json"]) == 0
+    rows = {r["set"]: r for r in json.loads(capsys.readouterr().out)}
+    assert (rows["robofail"]["starts"], rows["robofail"]["test"]) == (100, 20_000)
+    assert (rows["eyes"]["starts"], rows["eyes"]["test"]) == (7, 40_000)
+    assert rows["everyday"]["fails"] is False and rows["composed"]["fails"] is True
+    assert call(["cases", "list", "--set", "everyday", "--kinds"]) == 0
+    assert "second-other" in capsys.readouterr().out
+    assert call(["cases", "list", "--set", "everydya"]) == 2
+    assert "did you mean everyday" in capsys.readouterr().err
+
+
+def test_starts_are_judged_by_playing_them(capsys: pytest.CaptureFixture[str]) -> None:
+    flags = ["--task", "heat-potato", "--world", "symbolic", "--rounds", "2", "--quiet"]
+    assert call(["cases", "judge", "--set", "eyes", "long-undisturbed", *flags]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split() == ["eyes", "2", "2", "0", "0"]
+    assert call(["cases", "judge", "--set", "eyes", *flags, "--json"]) == 0
+    assert [r["success"] for r in json.loads(capsys.readouterr().out)] == [False, False]
+    assert call(["cases", "judge", "--set", "long", *flags]) == 2
+    assert "no start is of these sets and tasks" in capsys.readouterr().err
+
+
+def test_sets_are_drawn_into_a_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from forestall.experiments import starts
+    from forestall.tasks import drawing
+    from forestall.testing.part import SymbolicWorlds
+
+    monkeypatch.setattr(starts, "_world", lambda *_: SymbolicWorlds())
+    sizes = dict.fromkeys(drawing.SIZES, 2)
+    monkeypatch.setattr(drawing, "SIZES", sizes)
+    assert call(["cases", "draw", str(tmp_path), "--task", "boil-water", "--quiet"]) == 0
+    assert f"scenarios written to {tmp_path}" in capsys.readouterr().out
+    text = (tmp_path / "everyday" / "boil-water.toml").read_text()
+    assert text.count("[[scenarios]]") == 2 and 'task = "boil-water"' in text

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import forestall
 from forestall.assembly.configuration import Choice, Given, RunConfig, digest_of, run_config
 from forestall.assembly.kept import KeptObservations
-from forestall.assembly.make import prepare, run_episode
+from forestall.assembly.make import Prepared, prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.config import DEMONSTRATION_SEEDS, cache_dir
 from forestall.domain.model import Domain
@@ -39,6 +39,8 @@ from forestall.kinds import (
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import SqliteStore, open_store
 from forestall.processes import pool
+from forestall.tasks.files import LoadedTask, Scenario
+from forestall.tasks.variation import room_fixtures, vary
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.episode import BoundaryRecord
 from forestall.types.observation import Observation
@@ -65,6 +67,7 @@ class RecordingJob:
         given: what was said about the parts; only `RECORDED` ones and the domain count.
         tries: length of the range.
         keep: the memory beside which all that is seen is kept; None: it is not.
+        variant: which way to do the task, see `variation.vary`; 0 is the nominal plan.
     """
 
     task: str
@@ -72,6 +75,7 @@ class RecordingJob:
     given: Given = field(default_factory=Given)
     tries: int = TRIES
     keep: Path | None = None
+    variant: int = 0
 
     def config(self, seed: int) -> RunConfig:
         """The nominal run of one seed, with all that a demonstration keeps."""
@@ -91,11 +95,12 @@ def jobs_for(
     seed: int = DEMONSTRATION_SEEDS,
     given: Given | None = None,
     keep: Path | None = None,
+    varied: bool = False,
 ) -> list[RecordingJob]:
-    """`kitchens` jobs for each task, each with seeds of its own."""
+    """`kitchens` jobs for each task, each with seeds of its own; `varied`: as people do them."""
     said = given or Given()
     return [
-        RecordingJob(task, seed + 10 * k, said, keep=keep)
+        RecordingJob(task, seed + 10 * k, said, keep=keep, variant=k if varied else 0)
         for task in tasks
         for k in range(kitchens)
     ]
@@ -110,7 +115,7 @@ def record_one(job: RecordingJob) -> Demonstration:
     why: tuple[str, ...] = ()
     for seed in range(job.first_seed, job.first_seed + job.tries):
         config = job.config(seed)
-        prepared = prepare(config)
+        prepared = as_people_do(prepare(config), job.variant)
         viewer = make_viewer(config, prepared.loaded.domain)
         record = run_episode(prepared, None)
         keep = None if job.keep is None else KeptObservations(job.keep).keep
@@ -122,6 +127,18 @@ def record_one(job: RecordingJob) -> Demonstration:
         f"no successful run of {job.task} in seeds {job.first_seed} to "
         f"{job.first_seed + job.tries - 1}: {'; '.join(why)}"
     )
+
+
+def as_people_do(prepared: Prepared, variant: int) -> Prepared:
+    """A run of another way to do its task, slips included; the same run for variant 0."""
+    if not variant:
+        return prepared
+    loaded = prepared.loaded
+    way = vary(loaded.task, loaded.domain, variant, fixtures=room_fixtures(loaded))
+    task = replace(loaded.task, plan=way.plan, scene=way.scene)
+    slips = Scenario("slips", task.name, "", "slips", "; ".join(way.varied), way.slips)
+    scenario = slips if way.slips else None
+    return replace(prepared, loaded=LoadedTask(task, loaded.domain), scenario=scenario)
 
 
 def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord], View | None]:
@@ -212,8 +229,9 @@ def keyed(jobs: Sequence[RecordingJob]) -> dict[str, RecordingJob]:
         said = repr((job.task, job.given))
         if said not in digests:
             digests[said] = _content(job.config(job.first_seed))
+        way = f" variant {job.variant}" if job.variant else ""
         kept = "" if job.keep is None else " with observations"
-        found[f"{digests[said]} {job.first_seed} {job.tries}{kept}"] = job
+        found[f"{digests[said]} {job.first_seed} {job.tries}{way}{kept}"] = job
     return found
 
 

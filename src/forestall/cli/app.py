@@ -10,6 +10,7 @@ from cyclopts import App
 import forestall
 from forestall.cli import experiments
 from forestall.cli.bench import bench
+from forestall.cli.cases import cases
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
 from forestall.cli.domain import domain
@@ -33,6 +34,7 @@ for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
 app.command(demos)
 app.command(domain)
 app.command(bench)
+app.command(cases)
 experiments.register(bench)
 app.command(encoder)
 

@@ -34,6 +34,7 @@ def record(
     task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     kitchens: int | None = None,
     seed: int | None = None,
+    varied: Annotated[bool, Parameter(negative="")] = False,
     parts: SeeingFlags = DEFAULTS,
     jobs: int | None = None,
     keep_observations: Annotated[bool, Parameter(negative="")] = False,
@@ -46,6 +47,8 @@ def record(
         task: task names or files; all shipped tasks by default.
         kitchens: demonstrations per task; as many as the paper has by default.
         seed: first seed of the demonstration scenes.
+        varied: do the tasks as people do: in other orders, with other places and tools, with
+            detours and slips that are mended; the first of each task is the nominal plan.
         parts: which parts; the feature "image" keeps the look of every object.
         jobs: how many processes; all cores by default.
         keep_observations: keep pictures, depth and masks beside the memory, so that it can be
@@ -59,6 +62,7 @@ def record(
     from forestall.errors import InputError
     from forestall.memory.store import open_store
     from forestall.tasks.files import task_names
+    from forestall.tasks.variation import MOST
 
     kitchens = KITCHENS_PER_TASK if kitchens is None else kitchens
     first = DEMONSTRATION_SEEDS if seed is None else seed
@@ -69,7 +73,9 @@ def record(
     given, names = parts.given(), task or list(task_names())
     for name in names:
         run_config(name, given=given)
-    todo = jobs_for(names, kitchens, first, given, memory if keep_observations else None)
+    if varied and kitchens > MOST:
+        raise InputError(f"--kitchens {kitchens}: at most {MOST} varied ones of a task")
+    todo = jobs_for(names, kitchens, first, given, memory if keep_observations else None, varied)
     for job in todo[:1]:
         job.config(first)
     with open_store(memory, create=True) as store, bar("recording", quiet=quiet) as feed:

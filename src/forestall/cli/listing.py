@@ -18,12 +18,13 @@ def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
         as_json: print them as JSON, complete.
         schema: print the JSON schema of task files instead.
     """
-    from forestall.tasks.files import load_task, schemas, task_names
+    from forestall.tasks.files import load_task, long_task_names, schemas, task_names
 
     if schema:
         print(json.dumps(schemas()["task"], indent=2))
         return 0
-    loaded = [load_task(name).task for name in task_names(None)]
+    names = (*task_names(None), *long_task_names(None))
+    loaded = [load_task(name).task for name in names]
     if as_json:
         rows = [
             {
@@ -56,7 +57,7 @@ def scenarios(
 
     Args:
         task: only those of one task.
-        of: which set: examples, robofail, irreversible, harmless, or all.
+        of: which set (see `forestall cases list`; examples by default), or all.
         as_json: print them as JSON, complete.
         schema: print the JSON schema of scenario files instead.
     """
@@ -81,6 +82,7 @@ def scenarios(
                 "source": s.source,
                 "known": s.known,
                 "effect": s.effect,
+                "compared": s.compared,
                 "faults": [f.model_dump(mode="json", exclude_defaults=False) for f in s.faults],
             }
             for s in loaded

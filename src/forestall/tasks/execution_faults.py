@@ -28,8 +28,8 @@ class Activation(Protocol):
         """What goes wrong."""
 
     @property
-    def step(self) -> str:
-        """The subtask concerned, as plans write it."""
+    def step(self) -> str | None:
+        """The subtask concerned, as plans write it; None: before the robot does anything."""
 
     @property
     def occurrence(self) -> int:
@@ -57,13 +57,24 @@ class FaultyEnvironment:
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
         self._mistaken: set[int] = set()
+        self._undone = 0
 
     def reset(self, seed: int) -> None:
         """Reset the world and arm every fault again."""
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
         self._mistaken = set()
+        self._undone = 0
         self._inner.reset(seed)
+        for index, fault in enumerate(self._faults):
+            if fault.step is None:
+                self._meddle(fault)
+                self._done[index] += 1
+
+    @property
+    def idle(self) -> int:
+        """How many faults have not happened so far, or could not."""
+        return self._done.count(0) + self._undone
 
     def scan(self, thorough: bool = False) -> Observation:
         """As the wrapped environment."""
@@ -97,6 +108,9 @@ class FaultyEnvironment:
         outcome = self._pretend(command) if silent else self._inner.execute(command)
         if not lets_go:
             self._drop(due)
+        for index in due:
+            if self._faults[index].kind == "meanwhile":
+                self._meddle(self._faults[index])
         if self._takes(subtask) and outcome.status is SkillStatus.SUCCEEDED:
             self._mistaken -= {i for i in self._mistaken if self._is_right(i, subtask.args[0])}
             self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
@@ -105,6 +119,16 @@ class FaultyEnvironment:
     def hold(self) -> None:
         """As the wrapped environment."""
         self._inner.hold()
+
+    def _meddle(self, fault: Activation) -> None:
+        """Somebody else changes the world, as far as it can be done."""
+        thing, place = str(getattr(fault, "object", "")), getattr(fault, "place", None)
+        if place is not None:
+            happened = self._disturbance.rearrange(thing, place)
+        else:
+            changed = str(getattr(fault, "attribute", "")), str(getattr(fault, "value", ""))
+            happened = self._disturbance.alter(thing, *changed)
+        self._undone += not happened
 
     def _lets_go(self, subtask: Subtask) -> bool:
         """Whether a skill puts what the hand holds somewhere."""
@@ -139,7 +163,8 @@ class FaultyEnvironment:
 
     def _is_right(self, index: int, name: str) -> bool:
         """Whether a name means the thing that a fault mistakes something for."""
-        return self._same(Subtask.parse(self._faults[index].step).args[0], name)
+        step = self._faults[index].step
+        return step is not None and self._same(Subtask.parse(step).args[0], name)
 
     def _drop(self, due: Sequence[int]) -> None:
         """Lose what is held: on the way for a placing subtask, else after it."""
@@ -163,7 +188,7 @@ class FaultyEnvironment:
     def _due(self, subtask: Subtask) -> list[int]:
         due = []
         for index, fault in enumerate(self._faults):
-            if not self._means(Subtask.parse(fault.step), subtask):
+            if fault.step is None or not self._means(Subtask.parse(fault.step), subtask):
                 continue
             self._seen[index] += 1
             if self._seen[index] >= fault.occurrence and self._done[index] < fault.times:

@@ -24,8 +24,10 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.seams import Disturbance, Environment
 from forestall.tasks.execution_faults import FaultyEnvironment
-from forestall.tasks.scene_faults import FaultTable, SceneFault
+from forestall.tasks.eyes import SharedEyes
+from forestall.tasks.scene_faults import FaultTable, SceneFault, check_state
 from forestall.tasks.scene_faults import apply_scene_faults as apply_scene_faults  # noqa: PLC0414
+from forestall.types.facts import is_instance
 from forestall.types.plan import Plan, Subtask, same_step
 
 
@@ -119,6 +121,9 @@ class WrongObject(_Execution):
 
     kind: Literal["wrong_object"] = "wrong_object"
     acts_on: str
+    shared: bool = Field(
+        default=False, description="whether who watches the robot sees with its eyes, too"
+    )
 
 
 class WrongReceptacle(_Execution):
@@ -134,8 +139,32 @@ class WrongReceptacle(_Execution):
         return self
 
 
+class Meanwhile(FaultTable):
+    """Somebody else changes the world while the robot works: puts a thing somewhere, or a state.
+
+    It happens right after the step, before the robot looks again; without a step before the robot
+    does anything. What cannot be done there does not happen.
+    """
+
+    kind: Literal["meanwhile"] = "meanwhile"
+    step: Step | None = None
+    occurrence: Occurrence = 1
+    times: Annotated[int, Field(ge=1, description="how many times it happens at most")] = 1
+    object: str
+    place: str | None = Field(default=None, description="a receptacle, or the robot's hand")
+    attribute: str | None = None
+    value: str | None = None
+
+    @model_validator(mode="after")
+    def _one_change(self) -> Meanwhile:
+        state = (self.attribute is not None, self.value is not None)
+        if state not in ((True, True), (False, False)) or state[0] == (self.place is not None):
+            raise ValueError("give either 'place', or 'attribute' and 'value'")
+        return self
+
+
 PlanFault = DropStep | InsertStep | MoveStep | ReplaceArgument | ReplacePlan
-ExecutionFault = Drop | FailedAction | WrongObject | WrongReceptacle
+ExecutionFault = Drop | FailedAction | WrongObject | WrongReceptacle | Meanwhile
 Fault = Annotated[SceneFault | PlanFault | ExecutionFault, Field(discriminator="kind")]
 """Any fault, told apart by `kind`."""
 
@@ -163,7 +192,7 @@ def knowable(faults: Iterable[Any]) -> str:
     Where faults of several sorts meet, the one that shows last decides.
     """
     kinds = {type(f) for f in faults}
-    if kinds & {Drop, FailedAction, WrongObject, WrongReceptacle}:
+    if kinds & {Drop, FailedAction, WrongObject, WrongReceptacle, Meanwhile}:
         return "after"
     if kinds & {DropStep, InsertStep, MoveStep, ReplaceArgument, ReplacePlan}:
         return "plan"
@@ -205,7 +234,11 @@ def check_steps(plan: Plan, faults: Iterable[Any], domain: Domain) -> None:
         for name in subtask.args:
             domain[name]
     for fault in faults:
-        if not isinstance(fault, Drop | FailedAction | WrongObject | WrongReceptacle):
+        if not isinstance(fault, ExecutionFault):
+            continue
+        if isinstance(fault, Meanwhile):
+            _check_change(fault, domain)
+        if fault.step is None:
             continue
         step = domain.check(Subtask.parse(fault.step))
         for name in (*step.args, *([fault.acts_on] if hasattr(fault, "acts_on") else [])):
@@ -216,6 +249,16 @@ def check_steps(plan: Plan, faults: Iterable[Any], domain: Domain) -> None:
                 f"{fault.kind}.step: {step} comes {times} time(s) in the plan, "
                 f"which has: {', '.join(plan.texts())}"
             )
+
+
+def _check_change(fault: Meanwhile, domain: Domain) -> None:
+    category = domain[fault.object].name
+    if fault.attribute is not None and fault.value is not None:
+        check_state(category, fault.attribute, fault.value, "meanwhile", domain)
+        return
+    place = fault.place or ""
+    if place not in domain.robot.hands and not domain.accepts(domain[place].name, category):
+        raise InputError(f"meanwhile.place: {place} does not take {category}")
 
 
 def _canonical(subtask: Subtask, domain: Domain) -> Subtask:
@@ -229,12 +272,18 @@ def wrap(
     domain: Domain,
 ) -> Environment:
     """The environment with its execution faults; the same one where there are none."""
-    chosen = [
-        f for f in faults if isinstance(f, Drop | FailedAction | WrongObject | WrongReceptacle)
-    ]
+    chosen = [f for f in faults if isinstance(f, ExecutionFault)]
     if not chosen:
         return environment
-    return FaultyEnvironment(environment, chosen, disturbance, domain)
+    faulty = FaultyEnvironment(environment, chosen, disturbance, domain)
+    mistaken = {
+        (f.acts_on if is_instance(f.acts_on) else f"{domain[f.acts_on].name}-1"): domain[
+            Subtask.parse(f.step).args[0]
+        ].name
+        for f in chosen
+        if isinstance(f, WrongObject) and f.shared
+    }
+    return SharedEyes(faulty, mistaken, domain) if mistaken else faulty
 
 
 def _find(steps: Sequence[Subtask], text: str, occurrence: int, field: str) -> int:

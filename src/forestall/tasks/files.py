@@ -40,8 +40,17 @@ from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
 
-SETS = ("examples", "robofail", "irreversible", "harmless")
-"""Sets of shipped scenarios; each but the first is a folder of its own."""
+SETS = (
+    *("examples", "robofail", "irreversible", "harmless"),
+    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes", "long"),
+)
+"""Sets of shipped scenarios; each but the first is a folder of its own (docs/experiments.md)."""
+
+HARMLESS_SETS = ("harmless", "everyday", "planner-harmless")
+"""Sets of starts in which nothing fails because of what is different."""
+
+LONG = "long"
+"""The folder of tasks of more than 25 steps, and the set of their scenarios."""
 
 END = "end"
 """The moment after the last step of a plan."""
@@ -68,7 +77,7 @@ class Scenario:
         kind: what sort of failure it is, in RoboFail's terms where it has one.
         cause: what is wrong, in a sentence; for a harmless one, what is different.
         faults: what is changed.
-        set: "examples", "robofail", "irreversible" or "harmless"; "own" for a user's file.
+        set: one of `SETS`; "own" for a user's file.
         source: which published episode it rebuilds, empty for one of our own.
         known: the first step of its plan before which one who looks well and knows the task can
             know that the run will fail, "end" for after the last one; None for a harmless one.
@@ -76,6 +85,7 @@ class Scenario:
             that breaks by falling: the step on which it falls), "end" where none is and the run
             merely ends without its goal; None likewise.
         domain: whose it is, where it comes with the project.
+        compared: whether what is compared before some step differs because of it.
 
     Both are a step in text form; " #2" behind it means its second occurrence.
     """
@@ -91,11 +101,12 @@ class Scenario:
     known: str | None = None
     effect: str | None = None
     domain: str = ""
+    compared: bool | None = None
 
     @property
     def harmless(self) -> bool:
         """Whether nothing fails because of it."""
-        return self.set == "harmless"
+        return self.set in HARMLESS_SETS
 
     def moments(self, plan: Plan) -> tuple[int | None, int | None]:
         """Where `known` and `effect` are in the plan that the run starts with, from 0.
@@ -115,8 +126,13 @@ def schemas() -> dict[str, Any]:
 
 
 def task_names(domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
-    """Names of the shipped tasks of a domain; None: of all."""
+    """Names of the shipped tasks of a domain; None: of all. The long ones are not among them."""
     return tuple(sorted(n for n, _, d in _shipped("tasks") if domain in (None, d)))
+
+
+def long_task_names(domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
+    """Names of the shipped tasks of more than 25 steps."""
+    return tuple(sorted(n for n, _, d in _shipped("tasks", LONG) if domain in (None, d)))
 
 
 def scenario_names(of: str | None = None, domain: str | None = DEFAULT_DOMAIN) -> tuple[str, ...]:
@@ -199,6 +215,7 @@ def _scenario(data: ScenarioFields, task: str, set_name: str, domain: str = "") 
         data.known,
         data.effect,
         domain,
+        data.compared,
     )
 
 
@@ -234,7 +251,8 @@ def _read(folder: str, kind: str, name_or_file: str) -> tuple[str, str, str]:
     if _is_file(name_or_file):
         path = Path(name_or_file)
         return str(path), read_text(path, f"{kind} file", MOST_TOML_BYTES), DEFAULT_DOMAIN
-    shipped = {name: (text, domain) for name, text, domain in _shipped(folder)}
+    found = (*_shipped(folder), *_shipped(folder, LONG))
+    shipped = {name: (text, domain) for name, text, domain in found}
     if name_or_file not in shipped:
         raise UnknownNameError(kind, name_or_file, shipped)
     return name_or_file, *shipped[name_or_file]

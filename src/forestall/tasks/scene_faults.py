@@ -135,7 +135,7 @@ def _add(needs: SceneNeeds, fault: AddObject, domain: Domain) -> SceneNeeds:
     if category_of(name) != category.name or not is_instance(name):
         raise InputError(f"add_object.id: {name!r} must read {category.name}-<number>")
     for attribute, value in fault.states.items():
-        _check_state(category.name, attribute, value, "add_object.states", domain)
+        check_state(category.name, attribute, value, "add_object.states", domain)
     front = fault.in_front_of
     if front is not None:
         front = _chosen(needs, front, "add_object.in_front_of", domain)[0].id
@@ -150,7 +150,7 @@ def _add(needs: SceneNeeds, fault: AddObject, domain: Domain) -> SceneNeeds:
 def _set(needs: SceneNeeds, fault: SetState, domain: Domain) -> SceneNeeds:
     name = domain.canonical(fault.object)
     category = domain[name]
-    _check_state(category.name, fault.attribute, fault.value, "set_state", domain)
+    check_state(category.name, fault.attribute, fault.value, "set_state", domain)
     if domain.is_a(category.name, domain.roles.fixture):
         instance = name if is_instance(name) else f"{name}-1"
         kept = tuple(f for f in needs.fixtures if f[:2] != (instance, fault.attribute))
@@ -165,7 +165,8 @@ def _set(needs: SceneNeeds, fault: SetState, domain: Domain) -> SceneNeeds:
     return replace(needs, objects=tuple(objects))
 
 
-def _check_state(category: str, attribute: str, value: str, field: str, domain: Domain) -> None:
+def check_state(category: str, attribute: str, value: str, field: str, domain: Domain) -> None:
+    """Raise UnknownNameError where a category has no such attribute, or that no such value."""
     known = domain[category].attributes
     if attribute not in known:
         raise UnknownNameError(f"attribute of {category} ({field})", attribute, known)

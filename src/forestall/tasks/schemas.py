@@ -85,6 +85,7 @@ class ScenarioFields(_Model):
     source: str = ""
     known: str | None = None
     effect: str | None = None
+    compared: bool | None = None
     faults: list[Fault] = Field(min_length=1)
 
 

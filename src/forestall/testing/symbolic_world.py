@@ -15,6 +15,7 @@ from forestall.domain.evaluate import by_number
 from forestall.domain.model import Domain
 from forestall.domain.schema import PredicateKind
 from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.settle import settle
 from forestall.planning.state import State
 from forestall.testing.symbolic_scene import relation_at, start_scene
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
@@ -155,6 +156,51 @@ class SymbolicWorld:
         self._become(after)
         self._released = None
         return thing
+
+    def rearrange(self, thing: str, place: str) -> bool:
+        """See `Disturbance`; somebody else's hands reach everywhere and open what is shut."""
+        domain, state = self._domain, self._state
+        named = [n for n in state.matches(thing) if n != state.held]
+        if not named or not domain.is_a(named[0], domain.roles.movable):
+            return False
+        name, after = named[0], state.copy()
+        if place in domain.robot.hands:
+            if state.held is not None or domain.roles.holding is None:
+                return False
+            after.add((domain.roles.holding, name, place))
+        else:
+            kind = after.kinds[name]
+            free = [p for p in state.matches(place) if domain.accepts(p, kind) and p != name]
+            free = [p for p in free if self._has_room(p) and not self._is_within(p, name)]
+            here = state.place(name)
+            free = [p for p in free if here is None or p != here.parent]
+            if not free:
+                return False
+            after.add((relation_at(domain, kind, free[0]), name, free[0]))
+        for fact in [f for f in after.facts if f[0] == domain.roles.blocking and name in f[1:]]:
+            after.remove(fact)
+        after.lost = after.lost - {name}
+        settle(after)
+        self._become(after)
+        return True
+
+    def alter(self, thing: str, attribute: str, value: str) -> bool:
+        """See `Disturbance`."""
+        named = self._state.matches(thing)
+        if not named or self._state.value(named[0], attribute) in (None, value):
+            return False
+        after = self._state.copy()
+        after.set_value(named[0], attribute, value)
+        settle(after)
+        self._become(after)
+        return True
+
+    def _has_room(self, place: str) -> bool:
+        capacity = self._domain.number(place, "capacity")
+        return capacity is None or len(self._state.contents(place)) < capacity
+
+    def _is_within(self, place: str, thing: str) -> bool:
+        return any(p.parent == thing for p in self._state.chain(place))
 
     # --- inside ----------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from forestall.domain.model import Domain
 from forestall.errors import ForestallError, SceneError
 from forestall.seams import Renderer
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
-from forestall.types.facts import Literal, category_of
+from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Subtask
@@ -32,7 +32,12 @@ from forestall.worlds.kitchen.household import FLOOR, Household
 from forestall.worlds.kitchen.imperfection import ImperfectMotions, Rates
 from forestall.worlds.kitchen.law import Way, draw_law
 from forestall.worlds.kitchen.motions import Motions
-from forestall.worlds.kitchen.naming import RefusalError
+from forestall.worlds.kitchen.naming import (
+    RefusalError,
+    resolve_receptacle,
+    resolve_thing,
+    why_no_room,
+)
 from forestall.worlds.kitchen.needs import roomed
 from forestall.worlds.kitchen.rendering.memory import FrameMemory
 from forestall.worlds.kitchen.skills import perform
@@ -256,6 +261,42 @@ class KitchenEnvironment:
         effects.crash(household, held, hard)
         effects.settle(household, self._effect_config)
         return held
+
+    def rearrange(self, thing: str, place: str) -> bool:
+        """See `Disturbance`; somebody else's hands reach everywhere and open what is closed."""
+        household = self._acting.household
+        try:
+            name = resolve_thing(household, thing)
+            if name == household.held or not household.category(name).pickupable:
+                return False
+            if place == GRIPPER:
+                if household.held is not None:
+                    return False
+                household.hold(name)
+            else:
+                where = resolve_receptacle(household, place, name)
+                full = why_no_room(household, name, where) is not None
+                inside = name in (where, *household.ancestors(where))
+                there = household.parent(name) == where
+                if there or full or inside or not household.catalogue.accepts(where, name):
+                    return False
+                household.put(name, where)
+                effects.arrived(household, name, where)
+        except (RefusalError, SceneError):
+            return False
+        effects.settle(household, self._effect_config)
+        return True
+
+    def alter(self, thing: str, attribute: str, value: str) -> bool:
+        """See `Disturbance`."""
+        household = self._acting.household
+        try:
+            name = resolve_thing(household, thing)
+        except RefusalError:
+            return False
+        changed = household.set_state(name, attribute, value)
+        effects.settle(household, self._effect_config)
+        return changed
 
     @property
     def time_s(self) -> float:

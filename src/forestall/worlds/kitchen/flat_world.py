@@ -178,8 +178,8 @@ class FlatWorld:
 
     def hold(self, thing: str) -> None:
         """Put a thing into the gripper."""
-        if self._held is not None or not self.within_reach(thing):
-            raise SceneError(f"cannot hold {thing}: hand full or out of reach")
+        if self._held is not None:
+            raise SceneError(f"cannot hold {thing}: the hand is full")
         self._parents[thing] = None
         self._lying_x_m.pop(thing, None)
         self._held = thing

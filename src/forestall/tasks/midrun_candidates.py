@@ -1,0 +1,125 @@
+"""What may go wrong, or right, in the middle of a run, at a drawn step of any task.
+
+Called by `drawing`, which plays each and keeps what it says; calls `composing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from forestall.tasks.composing import Candidate, Composed, counted, named
+from forestall.tasks.faults import Drop, FailedAction, Fault, Meanwhile
+from forestall.tasks.scene_faults import AddObject
+from forestall.types.plan import Plan
+
+
+class MidrunComposer(Composed):
+    """Draws what comes about while the robot works."""
+
+    def midrun(self, plan: Plan) -> list[Candidate]:
+        """Differences that come about right after a drawn step."""
+        found = [*self._meanwhile_states(), *self._meanwhile_moves(), *self._meanwhile_others()]
+        drawn = [c for change in found for c in self._at_steps(plan, *change)]
+        return [*drawn, *self._slips(plan), *self._helps(plan)]
+
+    def _meanwhile_states(self) -> Iterator[tuple[str, str, tuple[Fault, ...], Meanwhile]]:
+        for name, attribute, value in self.changes():
+            told = f"somebody makes {self.the(name)} {self.domain.say(attribute, value)}"
+            change = Meanwhile(object=name, attribute=attribute, value=value)
+            yield f"state-{attribute}", told, (), change
+
+    def _meanwhile_moves(self) -> Iterator[tuple[str, str, tuple[Fault, ...], Meanwhile]]:
+        domain = self.domain
+        for need in self.task.scene.objects:
+            if not domain.is_a(need.category, domain.roles.movable):
+                continue
+            for place in self.room:
+                avoided = any(domain.is_a(place, tag) for tag in domain.roles.avoid)
+                numbered = domain.is_a(place, domain.roles.numbered)
+                if avoided or numbered or not domain.accepts(place, need.category):
+                    continue
+                kind = "put-away" if domain.encloses(place) else "moved"
+                told = f"somebody puts {self.the(need.id)} {self.to(place)}"
+                yield kind, told, (), Meanwhile(object=need.id, place=f"{place}-1")
+
+    def _meanwhile_others(self) -> Iterator[tuple[str, str, tuple[Fault, ...], Meanwhile]]:
+        """Another thing comes to where the plan will put something, or into the hand."""
+        hands = self.domain.robot.hands if self.domain.roles.holding else ()
+        for place in (*self.targets(), *hands[:1]):
+            for other in self.drawn(None if place in hands else place)[:2]:
+                there = AddObject(category=other)
+                put = Meanwhile(object=f"{other}-1", place=place)
+                if place in hands:
+                    told = f"somebody puts {self.a(other)} into the robot's hand"
+                    yield "in-the-hand", told, (there,), put
+                    continue
+                limited = self.domain.is_a(place, self.domain.roles.vacatable)
+                told = f"somebody puts {self.a(other)} {self.to(place)}"
+                yield "occupied" if limited else "others-there", told, (there,), put
+
+    def _helps(self, plan: Plan) -> Iterator[Candidate]:
+        """Somebody does the work of a later step: changes its state, or puts its thing there."""
+        for later, step in enumerate(plan):
+            skill = self.domain.skill(step.skill)
+            made = [
+                f for e in skill.effects for f in e.facts if f.predicate in self.domain.attributes
+            ]
+            thing = self.meant(step.args[0])
+            change = None
+            if skill.undoes is not None and len(step.args) == 1 and made:
+                change = Meanwhile(object=thing, attribute=made[0].predicate, value=made[0].value)
+                told = f"somebody does {step}, which the plan does later"
+            elif (
+                skill.hand is not None and len(step.args) == 2 and self.domain.offers(step.args[1])
+            ):
+                change = Meanwhile(object=thing, place=self.meant(step.args[1]))
+                told = f"somebody puts {self.the(thing)} {self.to(step.args[1])}, as the plan would"
+            if change is not None and later > 1 and self.domain.find(thing) is not None:
+                before = int(self.rng.integers(later - 1))
+                yield from self._at_steps(plan, "helped", told, (), change, before)
+
+    def _at_steps(
+        self,
+        plan: Plan,
+        kind: str,
+        told: str,
+        more: tuple[Fault, ...],
+        change: Meanwhile,
+        at: int | None = None,
+    ) -> Iterator[Candidate]:
+        at = int(self.rng.integers(len(plan) - 1)) if at is None else at
+        step, number = counted(plan, at)
+        then = change.model_copy(update={"step": str(step), "occurrence": number})
+        yield Candidate(
+            self.task.name,
+            kind,
+            f"Meanwhile {told}"[:70],
+            f"While the robot works, after {named(step, number)}, {told}.",
+            (*more, then),
+            since=at + 1,
+            watch=() if kind in ("put-away", "moved") else ("thing", change.object),
+        )
+
+    def _slips(self, plan: Plan) -> Iterator[Candidate]:
+        """A step that comes to nothing, and a thing that is lost from the hand."""
+        for at in self.rng.permutation(len(plan))[:6]:
+            step, number = counted(plan, int(at))
+            skill = self.domain.skill(step.skill)
+            if not skill.drives:
+                yield Candidate(
+                    self.task.name,
+                    "failed-action",
+                    f"{named(step, number)} comes to nothing",
+                    f"{named(step, number)} does nothing and reports success.",
+                    (FailedAction(step=str(step), occurrence=number),),
+                    since=int(at) + 1,
+                )
+            if skill.drives:
+                yield Candidate(
+                    self.task.name,
+                    "dropped",
+                    f"Lost during {named(step, number)}",
+                    f"What the robot holds slips from its hand during {named(step, number)}.",
+                    (Drop(step=str(step), occurrence=number),),
+                    since=int(at) + 1,
+                )
