@@ -33,7 +33,7 @@ DEFAULTS = Given.named(
         "detector": "preconditions",
         "segmenter": "given-masks",
         "states": "given",
-        "strategy.repeats": True,
+        "strategy": {"name": "proactive", "repeats": True},
     }
 )
 """What a monitor of somebody's own has where nothing is said: it judges by what always held, which

@@ -226,6 +226,7 @@ def replan_json(replan: Replan) -> dict[str, Any]:
         "expanded": replan.expanded,
         "seconds": replan.seconds,
         "note": replan.note,
+        "looking_for": list(replan.looking_for),
     }
 
 
@@ -239,6 +240,7 @@ def replan_from(field: Field) -> Replan:
         expanded=field["expanded"].whole(),
         seconds=field["seconds"].number(),
         note=field["note"].text(),
+        looking_for=field["looking_for"].tuple_of(Field.text),
     )
 
 

@@ -20,6 +20,7 @@ from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
 from forestall.planning.validate import as_checked, observed, unmet, unsupported
+from forestall.replanning.hidden import hiding_places, sought
 from forestall.seams import PlanValidator
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Plan, Subtask
@@ -96,6 +97,9 @@ class PlannerReplanner:
     ) -> Replan:
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
+        lost = sought(diagnosis.must_change, context.graph)
+        if lost and (search := self._search(attempts, context, lost)) is not None:
+            return search
         wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.domain)]
         if not wanted:
             names = ", ".join(map(str, diagnosis.must_change))
@@ -130,6 +134,31 @@ class PlannerReplanner:
                 if accepted is not None:
                     return accepted
         return self._failed(attempts, state, wanted)
+
+    def _search(
+        self, attempts: _Attempts, context: BoundaryContext, lost: tuple[str, ...]
+    ) -> Replan | None:
+        """Open a shut place in which something may be that nobody has seen; None: there is none.
+
+        What was left of the plan follows as it stands: it cannot be checked before the thing is
+        found, and is then.
+        """
+        shut = self.domain.roles.shut
+        if shut is None:
+            return None
+        state = observed(context.graph, self.domain)
+        attempts.refused = unexplained(state, context.refused)
+        for name in lost:
+            for place in hiding_places(name, context.graph, self.domain, context.references):
+                opened = Literal(shut, (place,), "false")
+                for kept in (_hand(state, [opened]), []):
+                    planned = self._to(attempts, state, (opened, *kept))
+                    found = self._checked(attempts, context, state, planned.subtasks, Goal(""))
+                    if planned.subtasks and found is not None and found.plan is not None:
+                        plan = Plan((*found.plan.subtasks, *context.remaining()), found.plan.goal)
+                        note = f"looking for {name} in {place}"
+                        return replace(found, plan=plan, note=note, looking_for=lost)
+        return None
 
     def _repairs(
         self,
@@ -200,10 +229,11 @@ class PlannerReplanner:
         context: BoundaryContext,
         state: State,
         subtasks: Sequence[Subtask],
+        goal: Goal | None = None,
     ) -> Replan | None:
         plan = Plan(tuple(subtasks), context.plan.goal or context.task.goal.text)
         attempts.deadline.check()
-        check = self.validator.check(plan, context.graph, context.task.goal)
+        check = self.validator.check(plan, context.graph, goal or context.task.goal)
         denied = is_refused(check.plan or plan, attempts.refused)
         if denied is not None:
             reason = f"the robot has refused {denied}, and nothing about it has changed"

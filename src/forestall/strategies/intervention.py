@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 
-from forestall.domain.model import Domain
+from forestall.domain.model import LOCATED, Domain
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.types.facts import Literal
@@ -19,6 +19,7 @@ from forestall.types.verdict import (
     Calibration,
     Decision,
     Diagnosis,
+    PlanCheck,
     Replan,
     ReplanOutcome,
     Verdict,
@@ -66,6 +67,7 @@ class Intervention:
         self._max_attempts = max_attempts
         self._resume_left = 0
         self._attempts: dict[tuple[Literal, ...], int] = {}
+        self._sought: frozenset[str] = frozenset()
 
     def begin(self, context: BoundaryContext) -> None:
         """To be called before every subtask: forgets the last episode when a new one begins."""
@@ -73,6 +75,7 @@ class Intervention:
             self._resume_left = len(context.plan)
             if context.index == 0:
                 self._attempts.clear()
+                self._sought = frozenset()
 
     def repairs(self, context: BoundaryContext) -> bool:
         """Whether the subtask belongs to a repair, for which there is no demonstration."""
@@ -94,10 +97,7 @@ class Intervention:
 
     def why_not(self, context: BoundaryContext, clock: Clock) -> Diagnosis | None:
         """Why what is left of the plan would not run from what is seen, None if it would."""
-        check = self._validator.check(
-            rest_of(context, self._validator.domain), context.graph, context.task.goal
-        )
-        clock.lap("validate")
+        check = self.check_plan(context, clock)
         if check.ok:
             return None
         return Diagnosis(
@@ -105,6 +105,21 @@ class Intervention:
             must_change=check.lacking or check.unmet,
             producer=PLAN_CHECK,
         )
+
+    def check_plan(self, context: BoundaryContext, clock: Clock) -> PlanCheck:
+        """Does what is left of the plan run from what is seen?
+
+        While something is looked for, a later step that lacks nothing but its place is no fault.
+        """
+        rest = rest_of(context, self._validator.domain)
+        check = self._validator.check(rest, context.graph, context.task.goal)
+        clock.lap("validate")
+        now = len(rest) - len(context.remaining())
+        looking = {Literal(LOCATED, (name,)) for name in self._sought}
+        later = check.step is not None and check.step > now
+        if not check.ok and later and check.lacking and looking.issuperset(check.lacking):
+            return replace(check, ok=True)
+        return check
 
     def check_goal(self, context: BoundaryContext, clock: Clock) -> tuple[Verdict, Diagnosis]:
         """Is the task's goal reached on what is seen? Names what of it is not."""
@@ -130,6 +145,25 @@ class Intervention:
         )
         return self.alarm(context, verdict, diagnosis, clock)
 
+    def look_for(
+        self, context: BoundaryContext, verdict: Verdict, clock: Clock
+    ) -> StrategyAnswer | None:
+        """An argument is nowhere to be seen, after every look: a plan to look where it may be.
+
+        None where nothing is missing, or no place is left to look in.
+        """
+        lost = tuple(n for n in context.subtask.args if not context.graph.matches(n))
+        if not lost or context.may_look:
+            return None
+        diagnosis = Diagnosis(
+            cause=f"{' and '.join(lost)} has not been seen",
+            must_change=tuple(Literal(LOCATED, (n,)) for n in lost),
+            producer=PLAN_CHECK,
+        )
+        alarmed = replace(verdict, decision=Decision.REPLAN)
+        answer = self.alarm(context, alarmed, diagnosis, clock)
+        return answer if answer.decision is Decision.REPLAN else None
+
     def alarm(
         self,
         context: BoundaryContext,
@@ -149,7 +183,10 @@ class Intervention:
         replan = self._replanner.replan(context, diagnosis)
         clock.lap("replan")
         if replan.outcome is ReplanOutcome.SOLVED and replan.plan is not None:
-            self._attempts[key] = self._attempts.get(key, 0) + 1
+            if replan.looking_for:  # another place each time, and there are only so many
+                self._sought |= frozenset(replan.looking_for)
+            else:
+                self._attempts[key] = self._attempts.get(key, 0) + 1
             self._resume_left = min(self._resume_left, _common_suffix(replan.plan, context))
             return StrategyAnswer(
                 Decision.REPLAN, verdict, diagnosis, replan, diagnosis.cause, clock.items()
@@ -169,10 +206,7 @@ class Intervention:
         clock: Clock,
     ) -> StrategyAnswer:
         """Go on only if the plan at hand still checks out on what is seen."""
-        check = self._validator.check(
-            rest_of(context, self._validator.domain), context.graph, context.task.goal
-        )
-        clock.lap("validate")
+        check = self.check_plan(context, clock)
         decision = Decision.PROCEED if check.ok else Decision.STOP
         why = "no repair found; " + (
             "the plan at hand still checks out" if check.ok else f"stopped: {check.reason}"

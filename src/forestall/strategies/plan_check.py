@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.intervention import (
@@ -17,7 +18,6 @@ from forestall.strategies.intervention import (
     Intervention,
     checked,
     look_again,
-    rest_of,
 )
 from forestall.types.episode import SkillOutcome
 from forestall.types.facts import Literal
@@ -55,8 +55,7 @@ class PlanChecking:
         if context.subtask in context.refused:
             return self._intervention.refused(context, clock)
         domain = self._validator.domain
-        check = self._validator.check(rest_of(context, domain), context.graph, context.task.goal)
-        clock.lap("validate")
+        check = self._intervention.check_plan(context, clock)
         verdict = checked(PLAN_CHECK, check.ok, _note(check))
         if not check.ok:
             diagnosis = Diagnosis(
@@ -67,10 +66,12 @@ class PlanChecking:
             if context.may_look:
                 return look_again(verdict, clock, diagnosis.cause)
             return self._intervention.alarm(context, verdict, diagnosis, clock)
-        unseen = _relied_on_now(check, context, domain)
+        lost = [n for n in context.subtask.args if not context.graph.matches(n)]
+        unseen = lost or [str(x) for x in _relied_on_now(check, context, domain)]
         if unseen:
-            why = f"not observed: {', '.join(map(str, unseen))}"
-            return look_again(replace(verdict, note=why), clock, why)
+            why = f"not observed: {', '.join(unseen)}"
+            found = self._intervention.look_for(context, verdict, clock)
+            return found or look_again(replace(verdict, note=why), clock, why)
         return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
@@ -85,13 +86,33 @@ class PlanChecking:
 def _relied_on_now(
     check: PlanCheck, context: BoundaryContext, domain: Domain
 ) -> tuple[Literal, ...]:
-    """Unobserved facts about the next subtask's arguments that bear on whether it can run."""
+    """Unobserved facts about the next subtask's arguments that its needs speak of.
+
+    What is assumed of things that nobody has seen is not among them: those are looked for.
+    """
+    needed, known = _spoken_of(domain, context.subtask.skill), {n.id for n in context.graph.nodes}
     return tuple(
         x
         for x in check.assumed
-        if set(x.args) & set(context.subtask.args)
-        and not ((known := domain.attributes.get(x.predicate)) and known.material)
+        if x.predicate in needed
+        and set(x.args) & set(context.subtask.args)
+        and known.issuperset(x.args)
     )
+
+
+def _spoken_of(domain: Domain, skill: str) -> set[str]:
+    """Predicates of a skill's needs, and of what derived ones among them are defined by."""
+    pending = [x.predicate for n in domain.skill(skill).needs for x, _ in literals(n.formula)]
+    found: set[str] = set()
+    while pending:
+        predicate = pending.pop()
+        if predicate in found:
+            continue
+        found.add(predicate)
+        known = domain.derived.get(predicate)
+        if known is not None and known.definition is not None:
+            pending += [x.predicate for x, _ in literals(known.definition)]
+    return found
 
 
 def _note(check: PlanCheck) -> str:

@@ -83,7 +83,8 @@ class Proactive:
         diagnosis = self._reasoner.diagnose(context, verdict)
         clock.lap("diagnose")
         if unseen and not diagnosis.must_change:
-            return StrategyAnswer(
+            found = self._intervention.look_for(context, verdict, clock)
+            return found or StrategyAnswer(
                 Decision.LOOK_AGAIN, verdict, diagnosis, None, verdict.note, clock.items()
             )
         return self._intervention.alarm(context, verdict, diagnosis, clock)

@@ -203,3 +203,4 @@ class Replan:
     expanded: int = 0  # search nodes
     seconds: float = 0.0
     note: str = ""
+    looking_for: tuple[str, ...] = ()  # the plan opens a place in which these may be

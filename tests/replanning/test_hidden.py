@@ -1,0 +1,132 @@
+"""Looking for what nobody has seen: which places, which plan, and how a run goes on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from forestall import Goal, Literal, Monitor, Outcome, Plan, Subtask, Task
+from forestall.domain.load import shipped
+from forestall.replanning.hidden import hiding_places, sought
+from forestall.types.graph import SceneGraph
+from forestall.types.scene import SceneNeeds
+from forestall.types.symbolic import scene_graph
+from forestall.types.verdict import Reference
+
+DOMAIN = shipped("household")
+PLAN = Plan.parse(["pick_up(Egg)", "put_on(Egg, CounterTop)"])
+SHUT = ("Fridge-1", "Cabinet-1", "Microwave-1")
+
+
+def box(x: float) -> list[list[float]]:
+    return [[x, 0, 0], [x + 0.5, 0.5, 0.9]]
+
+
+class Kitchen:
+    """Closed things in a row; the egg is in one of them."""
+
+    def __init__(self, egg_in: str) -> None:
+        self.egg_in: str | None = egg_in
+        self.open: dict[str, bool] = dict.fromkeys(SHUT, False)
+        self.opened: list[str] = []
+        self.place = egg_in
+
+    def look(self) -> dict[str, Any]:
+        shown = self.egg_in is None or self.open.get(self.egg_in, True)
+        objects: dict[str, Any] = {
+            name: {"open": "open" if self.open[name] else "closed", "box": box(k)}
+            for k, name in enumerate(SHUT)
+        }
+        objects["Microwave-1"]["toggled"] = "off"
+        objects["CounterTop-1"] = {"box": box(4)}
+        relations: list[Any] = []
+        if shown:
+            objects["Egg-1"] = {"box": [[0.1, 0.1, 0.1], [0.2, 0.2, 0.2]]}
+            where = ("inside", self.egg_in) if self.egg_in in SHUT else ("on_top_of", self.egg_in)
+            relations = [["Egg-1", *(("held_by", "gripper") if self.egg_in is None else where)]]
+        hidden = [n for n in SHUT if not self.open[n]]
+        return {"objects": objects, "relations": relations, "hidden": hidden}
+
+    def do(self, step: Subtask) -> str:
+        if step.skill == "open_obj":
+            self.open[step.args[0]] = True
+            self.opened.append(step.args[0])
+        elif step.skill == "pick_up":
+            self.egg_in = None
+        elif step.skill == "put_on":
+            self.egg_in = step.args[1]
+        return "done"
+
+
+def graph(*names: str) -> SceneGraph:
+    return scene_graph({"objects": {name: {"open": "closed"} for name in names}})
+
+
+def test_only_what_is_shut_and_takes_it_is_looked_into() -> None:
+    scene = scene_graph(
+        {
+            "objects": {
+                "Fridge-1": {"open": "closed"},
+                "Fridge-2": {"open": "open"},
+                "Toaster-1": {},
+                "Cabinet-1": {"open": "closed"},
+                "CounterTop-1": {},
+            }
+        }
+    )
+    places = hiding_places("Egg", scene, DOMAIN, ())
+    assert set(places) <= {"Fridge-1", "Cabinet-1"} and "Fridge-1" in places
+
+
+def test_where_demonstrations_had_it_comes_first() -> None:
+    scene = graph("Fridge-1", "Microwave-1", "Cabinet-1")
+    usual = hiding_places("Plate", scene, DOMAIN, ())
+    last = usual[-1]
+    shown = scene_graph({"objects": ["Plate-1", last], "relations": [["Plate-1", "inside", last]]})
+    reference = Reference("d", "t", 0, Subtask.parse("pick_up(Plate-1)"), 1.0, shown)
+    assert hiding_places("Plate", scene, DOMAIN, [reference])[0] == last
+
+
+def test_what_is_in_sight_is_not_looked_for() -> None:
+    wanted = (Literal.parse("located(Egg)"), Literal.parse("open(Fridge-1)=open"))
+    assert sought(wanted, graph("Fridge-1")) == ("Egg",)
+    assert sought(wanted, graph("Fridge-1", "Egg-3")) == ()
+
+
+def play(kitchen: Kitchen) -> Monitor:
+    """Run a monitor that needs no demonstration of this task over it."""
+    goal = Goal("the egg is out", (), (Literal.parse("on_top_of(Egg, CounterTop)"),))
+    task = Task("fetch", "Fetch the egg", goal, PLAN, SceneNeeds())
+    shown = {"objects": ["Egg-1"]}
+    monitor = Monitor.from_demonstrations(
+        [("pick_up(Egg-1)", shown)], domain="household", strategy="plan-check"
+    )
+    monitor.start(task)
+    for _ in range(40):
+        if monitor.finished:
+            break
+        decision = monitor.before(kitchen.look())
+        if decision.may_start:
+            assert decision.command is not None
+            monitor.after(kitchen.do(decision.command))
+        elif decision.outcome not in (Outcome.REPLAN, Outcome.LOOK):
+            break
+    return monitor
+
+
+def test_it_is_found_wherever_it_is() -> None:
+    for place in SHUT:
+        if not DOMAIN.accepts(place, "Egg"):
+            continue
+        kitchen = Kitchen(place)
+        monitor = play(kitchen)
+        assert kitchen.egg_in == "CounterTop", (place, kitchen.opened)
+        assert monitor.finished
+        assert kitchen.opened[-1] == place and len(set(kitchen.opened)) == len(kitchen.opened)
+
+
+def test_not_found_after_all_is_a_stated_end() -> None:
+    kitchen = Kitchen("nowhere")
+    kitchen.open["nowhere"] = False
+    monitor = play(kitchen)
+    assert not monitor.finished
+    assert set(kitchen.opened) == {p for p in SHUT if DOMAIN.accepts(p, "Egg")}
