@@ -130,3 +130,10 @@ def test_not_found_after_all_is_a_stated_end() -> None:
     monitor = play(kitchen)
     assert not monitor.finished
     assert set(kitchen.opened) == {p for p in SHUT if DOMAIN.accepts(p, "Egg")}
+
+
+def test_where_the_goal_holds_already_nothing_is_done() -> None:
+    kitchen = Kitchen("CounterTop-1")
+    monitor = play(kitchen)
+    assert monitor.finished and kitchen.opened == []
+    assert monitor.executed == () and len(monitor.plan) == 0

@@ -305,3 +305,14 @@ def test_a_shape_that_cannot_be_built_is_refused_before_anything_is(
     domain = load_task(str(file)).domain
     with pytest.raises(InputError, match="category Ladle: size_m is width, depth and height"):
         catalogue(domain)
+
+
+def test_a_goal_that_nothing_can_meet_is_refused_when_it_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "knob.toml"
+    file.write_text(
+        'name = "knob"\ntitle = "Knob"\nplan = ["toggle_on(StoveKnob)"]\n'
+        '[goal]\ntext = "A knob is on."\nall = ["toggled(StoveKnob)=on"]\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=r"nothing can meet it, for StoveKnob has no toggled"):
+        load_task(str(file))

@@ -106,6 +106,22 @@ class Intervention:
             producer=PLAN_CHECK,
         )
 
+    def done_already(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer | None:
+        """Before the first step: the goal holds on what is seen, so that nothing is left to do."""
+        goal = context.task.goal
+        if context.index or context.replans or not goal.literals or goal.never:
+            return None
+        check = self._validator.check(Plan(()), context.graph, goal)
+        clock.lap("validate")
+        asked = {x.predicate for x in goal.literals}
+        if not check.ok or any(x.predicate in asked for x in check.assumed):
+            return None
+        why = "the goal holds already: nothing is left to do"
+        plan = Plan((), context.plan.goal)
+        replan = Replan(ReplanOutcome.SOLVED, plan, check, GOAL_CHECK, note=why)
+        verdict = checked(GOAL_CHECK, True, why)
+        return StrategyAnswer(Decision.REPLAN, verdict, None, replan, why, clock.items())
+
     def check_plan(self, context: BoundaryContext, clock: Clock) -> PlanCheck:
         """Does what is left of the plan run from what is seen?
 

@@ -52,6 +52,8 @@ class PlanChecking:
         """Execute what is left in the mind; on a refusal replan."""
         self._intervention.begin(context)
         clock = Clock()
+        if (done := self._intervention.done_already(context, clock)) is not None:
+            return done
         if context.subtask in context.refused:
             return self._intervention.refused(context, clock)
         domain = self._validator.domain

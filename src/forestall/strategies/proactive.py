@@ -63,6 +63,8 @@ class Proactive:
         if context.index == 0 and context.replans == 0:
             self._undone.clear()
         clock = Clock()
+        if (done := self._intervention.done_already(context, clock)) is not None:
+            return done
         if context.subtask in context.refused:
             return self._intervention.refused(context, clock)
         if self._intervention.repairs(context):

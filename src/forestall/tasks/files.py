@@ -315,7 +315,22 @@ def _fact(text: str, variables: Mapping[str, str], domain: Domain) -> Fact:
                 raise UnknownNameError("goal variable", name, variables)
         elif name not in domain.robot.hands:
             domain[name]
+    if fact.is_state:
+        _can_have(domain, fact, variables.get(fact.args[0], fact.args[0]))
     return fact
+
+
+def _can_have(domain: Domain, fact: Fact, name: str) -> None:
+    """See that a thing has the attribute that a goal is about: else nothing can meet it."""
+    own = domain[name]
+    if fact.predicate in own.attributes:
+        return
+    having = [c.name for c in domain.categories.values() if fact.predicate in c.attributes]
+    near = [c for c in having if own.name in domain.paired(c) or c in domain.paired(own.name)]
+    raise InputError(
+        f"goal '{fact}': nothing can meet it, for {own.name} has no {fact.predicate}"
+        + (f"; {' and '.join(near)} that belongs to it has" if near else "")
+    )
 
 
 def _scene(data: SceneFile, domain: Domain) -> SceneNeeds:
