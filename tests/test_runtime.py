@@ -353,6 +353,7 @@ IRREVERSIBLE = {
 """Scenario → the subtask that does the harm."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(IRREVERSIBLE))
 def test_what_cannot_be_undone_must_be_seen_before_it_is_done(scenario: str) -> None:
     task = load_scenario(scenario).task

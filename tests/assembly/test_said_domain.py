@@ -31,6 +31,8 @@ from forestall.experiments.runs import Settings
 from forestall.kinds import DOMAIN
 from forestall.types.episode import EpisodeRecord
 
+pytestmark = pytest.mark.slow
+
 NEED = (
     '  { fact = "dirt(?hole)=clean", else = "{hole} is full of chips", '
     'lacks = ["dirt(?hole)=clean"] },\n'

@@ -150,6 +150,7 @@ class Broken:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [

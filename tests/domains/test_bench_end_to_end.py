@@ -25,6 +25,8 @@ from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
 from forestall.types.verdict import Decision, ReplanOutcome
 
+pytestmark = pytest.mark.slow
+
 SYMBOLIC = Given.named({"world": "symbolic", "perceiver": "given-graph"})
 TASKS = ("fasten-plate", "glue-peg", "hand-over-washer")
 SCENARIOS = {

@@ -20,6 +20,8 @@ from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
 from forestall.statistics.cases import CASE_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
 
+pytestmark = pytest.mark.slow
+
 CHOICE = Choice("proactive", "development", limit=2)
 SMALL = Experiment(CHOICE, workers=2)
 

@@ -10,6 +10,8 @@ from forestall.planning.planner import plan_goal
 from forestall.planning.search import SearchConfig
 from forestall.types.verdict import ReplanOutcome
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_plan_among_two_hundred_things_runs(seed: int) -> None:

@@ -21,6 +21,8 @@ from forestall.types.observation import Detection, Frame, Intrinsics
 
 from .synthetic import Solid, at, looking, observed
 
+pytestmark = pytest.mark.slow
+
 COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
 SIZES = {"Mug": (0.085, 0.085, 0.1), "Bowl": (0.15, 0.15, 0.07), "Apple": (0.07, 0.07, 0.07)}
 THINGS = 12

@@ -20,6 +20,8 @@ from forestall.report.figure_values import (
     Spent,
 )
 
+pytestmark = pytest.mark.slow
+
 HOSTILE = "<b>&\"'$x_1$ ]]> --"
 SOME = Estimate(0.5, 0.3, 0.7, 20)
 NONE = Estimate(None)

@@ -13,6 +13,8 @@ from forestall.types.episode import EpisodeRecord
 
 from . import records
 
+pytestmark = pytest.mark.slow
+
 VOID = {"meta", "link", "img", "br", "hr", "input"}
 MAKERS = [
     records.potato_record,

@@ -34,6 +34,8 @@ from forestall.types.verdict import ReplanOutcome
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
+pytestmark = pytest.mark.slow
+
 NAMES = scenario_names("irreversible")
 SEEDS = (1, 2)
 QUICK = SearchConfig(time_limit_s=30.0, max_expansions=1500)

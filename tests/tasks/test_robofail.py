@@ -20,6 +20,8 @@ from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.flat_world import flat_environment
 
+pytestmark = pytest.mark.slow
+
 DOMAIN = shipped("household")
 SOURCES = {
     "boil-water": "boilWater",
