@@ -240,7 +240,7 @@ def replan_from(field: Field) -> Replan:
         expanded=field["expanded"].whole(),
         seconds=field["seconds"].number(),
         note=field["note"].text(),
-        looking_for=field["looking_for"].tuple_of(Field.text),
+        looking_for=field.optional("looking_for", lambda f: f.tuple_of(Field.text)) or (),
     )
 
 
