@@ -43,6 +43,14 @@ from forestall.worlds.kitchen.flat_world import flat_environment
 ON_FLAT_WORLDS = sorted(set(scenario_names("examples")) - {"knife-blocked"})
 """A flat world knows no place in front of another, so nothing can be moved out of the way there."""
 
+TASKS = [
+    name
+    if name in ("cook-egg", "heat-potato", "make-coffee")
+    else pytest.param(name, marks=pytest.mark.slow)
+    for name in task_names()
+]
+"""Every task; most of them in the whole suite only."""
+
 
 class TruthPerceiver:
     """Perception that is always right."""
@@ -118,7 +126,7 @@ def alarms(record: EpisodeRecord) -> list[BoundaryRecord]:
     ]
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", TASKS)
 def test_undisturbed_runs_succeed_with_and_without_monitor(task: str) -> None:
     plain = play(run_config(task, strategy="none", seed=5))
     assert plain.success
@@ -144,7 +152,7 @@ def test_scenarios_fail_unwatched_and_succeed_watched(scenario: str) -> None:
     assert any(b.replan is not None and b.replan.plan is not None for b in watched.boundaries)
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", TASKS)
 def test_without_demonstrations_undisturbed_runs_go_through(task: str) -> None:
     for strategy in ("plan-check", "retry-once"):
         record = play(run_config(task, strategy=strategy, seed=5))

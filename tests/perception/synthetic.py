@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -87,7 +88,19 @@ def _distances(solid: Solid, eye: np.ndarray, rays: np.ndarray) -> np.ndarray:
 
 
 def picture(solids: Sequence[Solid], pose: np.ndarray, camera: Intrinsics = CAMERA) -> Frame:
-    """Depth and instance ids of a scene; the colour tells ids apart."""
+    """Depth and instance ids of a scene; the colour tells ids apart. Each is drawn once."""
+    pose = np.asarray(pose, dtype=np.float64)
+    frame = _drawn(tuple(solids), pose.tobytes(), camera)
+    ids = frame.instance_ids
+    assert ids is not None, "every picture is drawn with its ids"
+    return replace(
+        frame, rgb=frame.rgb.copy(), depth_m=frame.depth_m.copy(), instance_ids=ids.copy()
+    )
+
+
+@lru_cache(maxsize=128)
+def _drawn(solids: tuple[Solid, ...], place: bytes, camera: Intrinsics) -> Frame:
+    pose = np.frombuffer(place, dtype=np.float64).reshape(4, 4).copy()
     v, u = np.mgrid[0 : camera.height, 0 : camera.width]
     local = np.stack(
         [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1
