@@ -23,6 +23,7 @@ OTHER_THINGS = {
     "relations": ["peg-7 held_by gripper"],
 }
 PIN = "pin-1 seated_in hole-1"
+BYSTANDER = scene("hand", more=["bolt-1"], relations=["bolt-1 seated_in hole-1"])
 PROCEED, REPLAN, HOLD, NOT = Outcome.PROCEED, Outcome.REPLAN, Outcome.HOLD, Outcome.NOT_JUDGED
 
 TWENTY: list[tuple[str, dict[str, Any], str, Outcome, str]] = [
@@ -38,7 +39,10 @@ TWENTY: list[tuple[str, dict[str, Any], str, Outcome, str]] = [
     ("dirty", scene("hand", hole="dirty"), INSERT, HOLD, "hole-1 is dirty"),
     ("occupied", scene("hand", more=["pin-1"], relations=[PIN]), INSERT, HOLD, "pin-1"),
     ("never seen so", scene("hand", hole="cracked"), INSERT, HOLD, "hole-1 is cracked"),
-    ("hand full", scene("hand", more=["peg-2"]), "grasp(peg-2)", REPLAN, "the gripper holds peg-1"),
+    ("hand full", scene("hand", more=["peg-2"]), "grasp(peg-2)", HOLD, "the gripper holds peg-1"),
+    ("a bystander in it", BYSTANDER, INSERT, HOLD, "bolt-1 is seated in hole-1"),
+    ("held already", scene("hand"), GRASP, HOLD, "to bring about holds already"),
+    ("in another place", scene("hole"), GRASP, HOLD, "peg-1"),
     ("loose already", scene(), UNSCREW, HOLD, "lid-1 is loose; it was tight"),
     ("argument gone", scene("hand", without=["hole-1"]), INSERT, NOT, "not located: hole-1"),
     ("argument out of view", scene("hand", unseen=["hole-1"]), INSERT, NOT, "not located: hole-1"),
@@ -71,6 +75,28 @@ def test_one_demonstration_is_enough_for_an_alarm_that_says_so() -> None:
     decision = Monitor.from_demonstrations(TWELVE[0]).check(scene("hand", hole="dirty"), INSERT)
     assert decision.outcome is Outcome.HOLD
     assert "it was clean in the only demonstration there is" in str(decision)
+
+
+def test_an_empty_hand_is_needed_after_two_demonstrations_too() -> None:
+    full = {"objects": ["peg-1", "tray-1", "cup-1"], "relations": [
+        "peg-1 lies_in tray-1", "cup-1 held_by gripper"]}  # fmt: skip
+    decision = Monitor.from_demonstrations(TWELVE[:2]).check(full, GRASP)
+    assert decision.outcome is Outcome.HOLD and "the gripper holds cup-1" in str(decision)
+
+
+def test_a_plan_may_be_a_list_and_what_is_none_is_named() -> None:
+    monitor = Monitor.from_demonstrations(TWELVE)
+    monitor.start([GRASP, INSERT])
+    assert monitor.before(scene()).command == Subtask.parse(GRASP)
+    with pytest.raises(InputError, match="a task, a plan or a list of subtasks"):
+        monitor.start("grasp(peg-1)")
+    with pytest.raises(InputError, match="a subtask is a text"):
+        monitor.check(scene(), None)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"a scene is a mapping.*not list"):
+        monitor.check([scene()], GRASP)  # type: ignore[arg-type]
+    monitor.before(scene())
+    with pytest.raises(InputError, match="outcome of a subtask 'True'"):
+        monitor.after(True)  # type: ignore[arg-type]
 
 
 def test_a_run_by_hand() -> None:

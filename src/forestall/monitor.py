@@ -16,7 +16,7 @@ A scene is an observation (RGB-D), a scene graph, or one in its short form (`typ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -90,16 +90,21 @@ class Monitor:
         self._state: RunState | None = None
         self._awaited: tuple[BoundaryContext, SkillOutcome] | None = None  # a look after it
 
-    def start(self, task: Task | Plan, plan: Plan | None = None) -> None:
+    def start(self, task: Task | Plan | Sequence[str], plan: Plan | None = None) -> None:
         """A run begins; everything of an earlier one is forgotten.
 
         Args:
-            task: goal and names; a plan alone is a task without a goal condition.
+            task: goal and names; a plan alone, or a list of subtasks in text form, is a task
+                without a goal condition.
             plan: the plan to start with, the task's own by default.
 
         Raises:
             PartError: the perceiver cannot be reset, or has not come back from an earlier run.
         """
+        if isinstance(task, Sequence) and not isinstance(task, str):
+            task = Plan(tuple(_subtask(s) for s in task))
+        if not isinstance(task, Task | Plan):
+            raise InputError(f"a task, a plan or a list of subtasks is needed, not {task!r}")
         if isinstance(task, Plan):
             task = Task(task.goal, task.goal, Goal(task.goal), task, SceneNeeds())
         first = task.plan if plan is None else plan
@@ -122,7 +127,7 @@ class Monitor:
         Raises:
             InputError: the subtask's arguments do not fit, or the scene cannot be read.
         """
-        wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
+        wanted = _subtask(subtask)
         if wanted.skill in self._domain.skills:
             self._domain.check(wanted)
         try:
@@ -365,16 +370,28 @@ class Monitor:
         """What can be judged; raises InputError where it is neither a picture nor a scene."""
         if isinstance(scene, Mapping):
             return scene_graph(scene)
+        if not isinstance(scene, SceneGraph | Observation):
+            raise InputError(
+                f"a scene is a mapping, a scene graph or an observation, not {type(scene).__name__}"
+            )
         if not isinstance(scene, SceneGraph) and not self._parts.perceives:
             raise InputError("this monitor has no perceiver: give it a scene graph")
         return scene
+
+
+def _subtask(said: Subtask | str) -> Subtask:
+    if isinstance(said, str):
+        return Subtask.parse(said)
+    if not isinstance(said, Subtask):
+        raise InputError(f"a subtask is a text, skill(thing, place), not {said!r}")
+    return said
 
 
 def _ended(outcome: SkillOutcome | str, reason: str) -> SkillOutcome:
     if isinstance(outcome, SkillOutcome):
         return outcome
     if outcome not in ENDED:
-        raise UnknownNameError("outcome of a subtask", outcome, ENDED)
+        raise UnknownNameError("outcome of a subtask", str(outcome), ENDED)
     return SkillOutcome(ENDED[outcome], 0.0, reason)
 
 

@@ -38,6 +38,12 @@ def test_skills_have_the_arity_that_was_shown_and_names_from_categories() -> Non
 def test_what_always_held_is_needed() -> None:
     assert needs("insert") == {
         "held_by(?peg, gripper)",
+        "lies_in_nothing(?driver)",
+        "lies_in_nothing(?hole)",
+        "lies_in_nothing(?peg)",
+        "seated_in_nothing(?driver)",
+        "seated_in_nothing(?hole)",
+        "seated_in_nothing(?peg)",
         "surface(?hole)=clean",
         "vacant(?hole)",
     }

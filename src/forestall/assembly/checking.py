@@ -17,6 +17,7 @@ from forestall.assembly.configuration import Given, RunConfig, digest_of, run_co
 from forestall.assembly.make import STORED_STATES, provenance
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import known
+from forestall.assembly.sources import scoped
 from forestall.assembly.stored import Stored, is_graph, read_scene, scenes_in
 from forestall.conclusion import MonitorConfig, unlocated
 from forestall.domain.model import Domain
@@ -135,6 +136,9 @@ def judge_stored(
             "each at most, or --subtask to judge all before the same one"
         )
     stated: dict[str, Mapping[str, str]] = {}
+    if demonstrations is not None:
+        seeing = Assembly(config.choices, domain, None, {"states": stated}).part(PERCEIVER)
+        demonstrations = scoped(demonstrations, seeing.scope)
     parts = Assembly(config.choices, domain, demonstrations, {"states": stated})
     bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
     strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)

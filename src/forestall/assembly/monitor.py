@@ -12,7 +12,7 @@ from typing import Any
 from forestall.assembly.configuration import Choice, Given, choices, domain_of
 from forestall.assembly.eyes import Eyes, is_picture
 from forestall.assembly.parts import Assembly
-from forestall.assembly.sources import Source, demonstrations_from
+from forestall.assembly.sources import Source, demonstrations_from, scoped
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
 from forestall.domain.words import Words
@@ -95,7 +95,9 @@ class Monitor(RunMonitor):
         else:
             own, told = _domain(domain), dict[str, Mapping[str, str]]()
             seeing = Assembly(choices(said), own, None, {"states": told})
-            demonstrations = demonstrations_from(source, Eyes(seeing.part(PERCEIVER), own, told))
+            perceiver = seeing.part(PERCEIVER)
+            found = demonstrations_from(source, Eyes(perceiver, own, told))
+            demonstrations = scoped(found, perceiver.scope)
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
@@ -117,10 +119,9 @@ class Monitor(RunMonitor):
         Of a picture the subtask may speak as its detections do: "pick_up(coffee mug)".
         """
         seen = self._read(scene)
-        wanted = Subtask.parse(subtask) if isinstance(subtask, str) else subtask
-        if isinstance(seen, Observation):
-            wanted = self._words.subtask(wanted)
-        return super().check(seen, wanted)
+        if isinstance(seen, Observation) and isinstance(subtask, str):
+            subtask = self._words.subtask(Subtask.parse(subtask))
+        return super().check(seen, subtask)
 
     def _read(self, scene: Scene) -> Observation | SceneGraph:
         """Also pictures as plain data (`perception.scene_dict`)."""

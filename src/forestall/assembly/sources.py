@@ -8,7 +8,7 @@ wrote is one JSON file, or one list of steps in Python:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,29 @@ def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demons
     if not found:
         raise InputError(f"no demonstration was found in {_said(source)}")
     return _named(found)
+
+
+def scoped(
+    demonstrations: Iterable[Demonstration], scope: Callable[[SceneGraph, Subtask], SceneGraph]
+) -> list[Demonstration]:
+    """Demonstrations whose graphs are whole, cut to what concerns each subtask as a monitor's are.
+
+    Args:
+        demonstrations: those that were cut before stay as they are.
+        scope: of the perceiver that they are compared with.
+    """
+    return [
+        replace(
+            d,
+            steps=tuple(
+                replace(s, graph=scope(s.whole, s.subtask))
+                if s.graph == replace(s.whole, subtask=s.subtask)
+                else s
+                for s in d.steps
+            ),
+        )
+        for d in demonstrations
+    ]
 
 
 def written(data: Any, folder: Path | None = None, eyes: Eyes | None = None) -> Demonstration:

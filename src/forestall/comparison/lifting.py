@@ -125,12 +125,19 @@ def _asks_for_way(variable: str, skill: Skill, domain: Domain) -> bool:
     )
 
 
-def kind_of(literal: Literal, domain: Domain) -> Kind:
-    """How far a lifted literal carries over."""
+def kind_of(literal: Literal, domain: Domain, skill: Skill | None = None) -> Kind:
+    """How far a lifted literal carries over.
+
+    What is about no argument follows from a skill only where its needs speak of it: that the hand
+    is empty is needed to grasp, and a habit of whoever drives somewhere.
+    """
     attribute = domain.attributes.get(literal.predicate)
     if literal.is_state and (attribute is None or attribute.material):
         return Kind.MATERIAL
     names = [a for a in literal.args if a != GRIPPER]
+    if not names and skill is not None and literal.args == ():
+        said = {x.predicate for n in skill.needs for x, _ in literals(n.formula)}
+        return Kind.SKILL if literal.predicate in said else Kind.CONTEXT
     if not names or any(not a.startswith("?") for a in names):
         return Kind.CONTEXT
     return Kind.SKILL

@@ -82,7 +82,7 @@ def mine(
         candidates |= lift(r.graph, r.subtask, domain)
     found = []
     for literal in sorted(candidates):
-        kind = kind_of(literal, domain)
+        kind = kind_of(literal, domain, domain.skills.get(subtask.skill))
         if not alike and kind is not Kind.SKILL:
             continue
         asked = group if kind is Kind.SKILL else [r for r in group if r.task == task]

@@ -148,6 +148,10 @@ def explain(
     if predicate == roles.accessible and yes:
         closed = _closed(graph, name, domain)
         return f"{name} is inside {closed}, which is closed; it was open {when}"
+    known = domain.derived.get(predicate)
+    if known is not None and known.words and known.opposite:
+        now = (known.opposite if yes else known.words).format(*literal.args)
+        return f"{now}, unlike {when}"
     relation = f"{predicate.replace('_', ' ')} {literal.args[-1]}" if literal.args else predicate
     if literal.value == "false":
         return f"{name} is {relation}; it was not {when}"

@@ -178,6 +178,7 @@ def _limits(by_skill: dict[str, list[Trace]], skills: dict[str, Skill]) -> tuple
     found = [
         "what always held before a skill is taken for needed: habit and need cannot be told apart",
         "what can be shut, what happens by itself and what is dangerous is not known",
+        "what is no argument of a subtask, and on or in what an argument lies, is not judged",
     ]
     for name, of in by_skill.items():
         runs = len({t.demonstration for t in of})

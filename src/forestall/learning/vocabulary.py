@@ -155,7 +155,8 @@ class Vocabulary:
                 name,
                 frozenset(
                     (
-                        HELD if name in self.moved else FIXED,
+                        *((HELD,) if name in self.moved else ()),
+                        *((FIXED,) if name in self.taking - self.moved else ()),
                         *(TAKES + r for r, who in self.takers.items() if name in who),
                         *((TAKER,) if name in self.taking else ()),
                     )
@@ -224,7 +225,7 @@ def _lacks(
     for name in others:
         if name not in containing:
             found.append(Lack(_free(f"nothing_{name}", taken), (name,), 1))
-            found.append(Lack(_free(f"{name}_nothing", taken), (name,), 0))
+        found.append(Lack(_free(f"{name}_nothing", taken), (name,), 0))
     return tuple(found)
 
 

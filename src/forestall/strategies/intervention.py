@@ -9,10 +9,12 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 
+from forestall.domain.formula import TRUE as ALWAYS
 from forestall.domain.model import LOCATED, Domain
+from forestall.domain.truth import truth
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, Truth
 from forestall.types.plan import Plan, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import (
@@ -196,8 +198,13 @@ class Intervention:
         if self._attempts.get(key, 0) >= self._max_attempts:
             why = f"tried {self._max_attempts} repairs of this already"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
+        if not context.task.goal.literals and self._brought_about(context):
+            why = f"what {context.subtask} is to bring about holds already"
+            return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
         replan = self._replanner.replan(context, diagnosis)
         clock.lap("replan")
+        if _is_the_old(replan.plan, context):  # what must change is nothing that planning knows of
+            return self._no_plan(context, verdict, diagnosis, replan, clock)
         if replan.outcome is ReplanOutcome.SOLVED and replan.plan is not None:
             if replan.looking_for:  # another place each time, and there are only so many
                 self._sought |= frozenset(replan.looking_for)
@@ -212,6 +219,18 @@ class Intervention:
                 Decision.LOOK_AGAIN, verdict, diagnosis, replan, replan.note, clock.items()
             )
         return self._no_plan(context, verdict, diagnosis, replan, clock)
+
+    def _brought_about(self, context: BoundaryContext) -> bool:
+        """Whether everything holds already that the subtask does whatever else is so."""
+        domain = self._validator.domain
+        names = domain.bound(context.subtask)
+        facts = [
+            f.bind(names)
+            for e in domain.skill(context.subtask.skill).effects
+            if not e.variables and e.condition == ALWAYS
+            for f in e.facts
+        ]
+        return bool(facts) and all(truth(context.graph, f, domain) is Truth.TRUE for f in facts)
 
     def _no_plan(
         self,
@@ -228,6 +247,16 @@ class Intervention:
             "the plan at hand still checks out" if check.ok else f"stopped: {check.reason}"
         )
         return StrategyAnswer(decision, verdict, diagnosis, replan, why, clock.items())
+
+
+def _is_the_old(plan: Plan | None, context: BoundaryContext) -> bool:
+    """Whether a corrected plan is the plan at hand, which an alarm speaks against."""
+    left = context.remaining()
+    return (
+        plan is not None
+        and len(plan) == len(left)
+        and all(same_step(new, old) for new, old in zip(plan, left, strict=True))
+    )
 
 
 def checked(detector: str, fine: bool, note: str) -> Verdict:
