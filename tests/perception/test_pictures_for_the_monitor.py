@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from forestall import InputError, Monitor, Outcome
+from forestall.cli.main import call
 from forestall.perception.folder import write_observation
 from forestall.types.observation import Observation
 
@@ -65,6 +66,18 @@ def test_demonstrations_may_be_folders_of_observations(tmp_path: Path) -> None:
 
 
 OPEN_BY_INSTANCE = {"Microwave-1": OPEN["Microwave"]}
+
+
+def test_they_are_added_to_a_memory_from_the_command_line(tmp_path: Path) -> None:
+    write_observation(tmp_path / "one", FITS, OPEN_BY_INSTANCE)
+    steps = [{"subtask": WANTED, "scene": "one"}]
+    (tmp_path / "shown.json").write_text(json.dumps({"steps": steps}), encoding="utf-8")
+    memory, shown = str(tmp_path / "m.db"), str(tmp_path / "shown.json")
+    assert call(["demos", "add", memory, shown]) == 2
+    assert call(["demos", "add", memory, shown, "--domain", "household"]) == 0
+    asked = monitor(memory)
+    assert asked.check(FITS, WANTED).outcome is Outcome.PROCEED
+    assert not asked.check(FULL, WANTED).may_start
 
 
 def test_a_picture_without_depth_is_not_judged_to_fit() -> None:

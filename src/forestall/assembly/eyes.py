@@ -9,9 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from forestall.assembly.configuration import Given, choices, domain_of
+from forestall.assembly.parts import Assembly
 from forestall.domain.model import Domain
 from forestall.domain.names import ground_subtask
 from forestall.domain.words import Words
+from forestall.kinds import DOMAIN, PERCEIVER
 from forestall.perception.folder import read_observation
 from forestall.perception.scene_dict import scene_from_dict
 from forestall.perception.scenes import Scenes
@@ -68,6 +71,18 @@ class Eyes:
         wanted = self._domain.check(self._words.subtask(said))
         ground = ground_subtask(wanted, graph, self._domain, self._robot_m, {})
         return ground, self._perceiver.scope(graph, ground)
+
+
+def eyes_for(given: Given) -> Eyes:
+    """Eyes of the parts that somebody named; masks and states are the stored ones by default.
+
+    Raises:
+        InputError: a name or an option that is not valid.
+    """
+    said = given.over(Given.named({"segmenter": "given-masks", "states": "given"}))
+    domain, told = domain_of(said.chosen(DOMAIN.name)), dict[str, Mapping[str, str]]()
+    perceiver = Assembly(choices(said), domain, None, {"states": told}).part(PERCEIVER)
+    return Eyes(perceiver, domain, told)
 
 
 def is_picture(given: object) -> bool:

@@ -86,7 +86,7 @@ def record(
 
 
 @demos.command
-def add(memory: Path, /, *sources: Path) -> int:
+def add(memory: Path, /, *sources: Path, parts: SeeingFlags = DEFAULTS) -> int:
     """Keep what shows a successful run as demonstrations.
 
     Args:
@@ -95,13 +95,16 @@ def add(memory: Path, /, *sources: Path) -> int:
             replanning, a refusal or a failure on the way; another memory; a demonstration that
             somebody wrote, or a graph with its subtask (JSON, docs/your-robot.md); or folders of
             these.
+        parts: what pictures are seen with; they need --domain.
     """
+    from forestall.assembly.eyes import eyes_for
     from forestall.assembly.sources import demonstrations_from
     from forestall.errors import InputError
 
     if not sources:
         raise InputError("no source was named: give the folder of at least one run, or a file")
-    return _kept(memory, demonstrations_from(sources))
+    eyes = None if parts.domain is None else eyes_for(parts.given())
+    return _kept(memory, demonstrations_from(sources, eyes))
 
 
 @demos.command
