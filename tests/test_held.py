@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -209,7 +210,10 @@ def test_a_held_run_has_a_record_that_reads_back(tmp_path: Path) -> None:
 
 def test_who_interrupts_a_run_finds_the_robot_held(tmp_path: Path) -> None:
     def interrupt(observation: Observation) -> Observation:
-        signal.raise_signal(signal.SIGINT)
+        ident = threading.main_thread().ident
+        assert ident is not None, "the main thread runs"
+        signal.pthread_kill(ident, signal.SIGINT)  # to whoever waits, as Ctrl-C comes
+        time.sleep(0.05)
         return observation
 
     fault = Fault("observe", changes(interrupt), 2)
