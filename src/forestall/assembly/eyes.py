@@ -70,19 +70,28 @@ class Eyes:
         """The subtask with the things that it means, and the part of a graph that concerns it."""
         wanted = self._domain.check(self._words.subtask(said))
         ground = ground_subtask(wanted, graph, self._domain, self._robot_m, {})
-        return ground, self._perceiver.scope(graph, ground)
+        return ground, self.scope(graph, ground)
+
+    def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
+        """The part of a graph that concerns a subtask."""
+        return self._perceiver.scope(graph, subtask)
 
 
-def eyes_for(given: Given) -> Eyes:
+def eyes_for(given: Given, domain: Domain | None = None) -> Eyes:
     """Eyes of the parts that somebody named; masks and states are the stored ones by default.
+
+    Args:
+        given: what was said about parts.
+        domain: whose words are matched; the one that was said, by default.
 
     Raises:
         InputError: a name or an option that is not valid.
     """
     said = given.over(Given.named({"segmenter": "given-masks", "states": "given"}))
-    domain, told = domain_of(said.chosen(DOMAIN.name)), dict[str, Mapping[str, str]]()
-    perceiver = Assembly(choices(said), domain, None, {"states": told}).part(PERCEIVER)
-    return Eyes(perceiver, domain, told)
+    own = domain_of(said.chosen(DOMAIN.name)) if domain is None else domain
+    told: dict[str, Mapping[str, str]] = {}
+    parts = Assembly(choices(said), own, None, {"states": told})
+    return Eyes(parts.part(PERCEIVER), own, told)
 
 
 def is_picture(given: object) -> bool:

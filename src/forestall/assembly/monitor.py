@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Choice, Given, choices, domain_of
-from forestall.assembly.eyes import Eyes, is_picture
+from forestall.assembly.eyes import eyes_for, is_picture
 from forestall.assembly.parts import Assembly
 from forestall.assembly.sources import Source, demonstrations_from, scoped
 from forestall.conclusion import MonitorConfig
@@ -93,11 +93,9 @@ class Monitor(RunMonitor):
             learnt = learn(demonstrations, hands=hands)
             own, limits = learnt.domain, learnt.limits
         else:
-            own, told = _domain(domain), dict[str, Mapping[str, str]]()
-            seeing = Assembly(choices(said), own, None, {"states": told})
-            perceiver = seeing.part(PERCEIVER)
-            found = demonstrations_from(source, Eyes(perceiver, own, told))
-            demonstrations = scoped(found, perceiver.scope)
+            own = _domain(domain)
+            eyes = eyes_for(said, own)
+            demonstrations = scoped(demonstrations_from(source, eyes), eyes.scope)
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
