@@ -2,8 +2,8 @@
 
     from forestall import Monitor
 
-    monitor = Monitor.from_demonstrations("memory.db", domain="household")
-    print(monitor.check(scene, "put_in(Plate, Microwave)"))
+    monitor = Monitor.from_demonstrations("memory.db")
+    print(monitor.check(scene, "insert(peg-1, hole-1)"))
 
 Everything that is named here is public, and nothing else is. Importing the package loads nothing
 heavy: each name is looked up when it is first used. See `docs/python.md`.

@@ -12,6 +12,7 @@ from forestall.experiments.engines import make_lanes
 from forestall.experiments.folder import ROWS
 from forestall.experiments.speed import GROUPS, Timed, Timing, measure
 
+TAKE = speed.take  # the real one, which the others do without
 taken: list[str] = []
 
 
@@ -49,3 +50,11 @@ def test_timings_of_another_kind_are_not_mixed_in(tmp_path: Path) -> None:
     (tmp_path / ROWS).write_text("{}\n")
     with pytest.raises(FileFormatError, match="line 1: the document lacks 'key'"):
         measure(3, 0, tmp_path, lambda *_: None)
+
+
+@pytest.mark.slow
+@pytest.mark.simulator
+@pytest.mark.parametrize("group", GROUPS[:2])
+def test_the_timings_themselves_can_be_taken(group: str) -> None:
+    taken_now = TAKE(Timing(group, 1, 0))
+    assert taken_now.rows and all(row["n"] >= 1 and row["median"] > 0 for row in taken_now.rows)

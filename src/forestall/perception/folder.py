@@ -18,6 +18,7 @@ import numpy as np
 from PIL import Image
 from pydantic import BaseModel, ConfigDict, Field
 
+from forestall.config import DEFAULT_DOMAIN
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
 from forestall.domain.words import Names, stated
@@ -138,7 +139,7 @@ def read_observation(
         ObservationError: the gate refuses it.
     """
     folder = Path(path)
-    words = domain or shipped("household")
+    words = domain or shipped(DEFAULT_DOMAIN)
     document = _document(folder)
     reading = _Reading(folder, document, words, names or Names(words))
     frames = tuple(reading.frame(data, index) for index, data in enumerate(document.frames))
