@@ -20,7 +20,7 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, STRATEGY
 from forestall.statistics.cases import CASE_SETS, UNDISTURBED, Case, cases
 from forestall.statistics.metrics import THRESHOLDS
-from forestall.statistics.rows import row_key
+from forestall.statistics.rows import EXACT, KIND, PLAIN, Setup
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "all")
 
@@ -91,11 +91,22 @@ class Run:
     detector: str = PAPER_DETECTOR
     threshold: float = field(default_factory=paper_threshold)
     without: str | None = None
+    profile: str = KIND
+    model: str = EXACT
+    demonstrations: str = PLAIN
 
     @property
     def key(self) -> str:
         """As `EpisodeRow.key`."""
-        return row_key(self.case, self.strategy, self.detector, self.threshold, self.without)
+        return Setup(
+            self.strategy,
+            self.detector,
+            self.threshold,
+            self.without,
+            self.profile,
+            self.model,
+            self.demonstrations,
+        ).key(self.case)
 
     @property
     def scene(self) -> tuple[str, int]:

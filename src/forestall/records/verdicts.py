@@ -74,6 +74,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
             for d in verdict.discrepancies
         ],
         "note": verdict.note,
+        "lacking": [str(x) for x in verdict.lacking],
     }
 
 
@@ -91,6 +92,7 @@ def verdict_from(field: Field) -> Verdict:
         discrepancies=field["discrepancies"].tuple_of(_discrepancy),
         references=field["references"].whole(),
         note=field["note"].text(),
+        lacking=field["lacking"].tuple_of(literal),
     )
 
 

@@ -45,9 +45,10 @@ TRIVIAL = (ALWAYS, NEVER, RANDOM, TRUTH)
 """Detectors that cost nothing, and the simulator's truth as the upper bound."""
 
 
-def order(row: EpisodeRow) -> tuple[str, str, str, int, str, str, float, str]:
+def order(row: EpisodeRow) -> tuple[str | int | float, ...]:
     """Where a row stands among others, whatever order they were written in."""
     return (
+        row.profile,
         row.set,
         row.task,
         row.scenario or "",
@@ -56,6 +57,8 @@ def order(row: EpisodeRow) -> tuple[str, str, str, int, str, str, float, str]:
         row.detector,
         row.threshold,
         row.without or "",
+        row.model,
+        row.demonstrations,
     )
 
 

@@ -17,16 +17,56 @@ from forestall.errors import FileFormatError
 from forestall.reading.models import validated_json
 from forestall.statistics.cases import Case
 
-ROW_FORMAT = 1
+ROW_FORMAT = 2
 """Raised whenever a field changes its meaning; rows of another format are refused."""
 
 
-def row_key(case: Case, strategy: str, detector: str, threshold: float, without: str | None) -> str:
-    """The key of an episode: readable, unique within an experiment, fit for a folder's name."""
-    parts = [case.scenario or f"undisturbed-{case.task}", str(case.seed), strategy]
-    if strategy not in ("none", "watch"):
-        parts += [detector, f"{threshold:.2f}"]
-    return "_".join([*parts, *([f"without-{without}"] if without else [])])
+KIND, HONEST = "kind", "honest"
+"""Profiles of the household: one in which nothing goes wrong by itself, and one like others."""
+
+EXACT = "exact"
+"""The model that knows what its domain file says; others know less, or say what is not so."""
+
+PLAIN = "4"
+"""Demonstrations when nothing is said: four of the nominal plan."""
+
+NOBODY = ("none", "watch", "retry-once")
+"""Strategies that judge nothing of what they see, so that model and memory make no difference."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Setup:
+    """Who watches over a run, and what he knows.
+
+    Args:
+        strategy: its name.
+        detector: that decides. `threshold`: of it.
+        without: what was left out ("reasoning", "validation"), or None.
+        profile: of the household, `KIND` or `HONEST`.
+        model: of the domain that the monitor reads: "exact", "coarse" or "wrong".
+        demonstrations: in its memory: how many, "varied" behind it where people's ways differ.
+    """
+
+    strategy: str
+    detector: str
+    threshold: float
+    without: str | None = None
+    profile: str = KIND
+    model: str = EXACT
+    demonstrations: str = PLAIN
+
+    def key(self, case: Case) -> str:
+        """The key of an episode: readable, unique within an experiment, fit for a folder's name."""
+        parts = [case.scenario or f"undisturbed-{case.task}", str(case.seed), self.strategy]
+        if self.strategy not in NOBODY:
+            parts += [self.detector, f"{self.threshold:.2f}"]
+        parts += [f"without-{self.without}"] if self.without else []
+        parts += [self.profile] if self.profile != KIND else []
+        if self.strategy not in NOBODY:
+            parts += [f"{self.model}-model"] if self.model != EXACT else []
+            told = self.demonstrations.replace(" ", "-")
+            parts += [f"{told}-demonstrations"] if self.demonstrations != PLAIN else []
+        return "_".join(parts)
 
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -47,7 +87,10 @@ class Judged:
         replanned: whether a new plan was adopted.
         cause: the diagnosis in words, empty without alarm.
         looks: how many looks it took.
-        scores: of every watching detector by name, None where it had nothing to compare with.
+        scores: of every watching judge by name, None where it had nothing to compare with. Below
+            its threshold it raises an alarm; a judge that says yes or no scores 1 or 0.
+        named: judge → the facts that it says must change, as text; only of judges that raise an
+            alarm here and name any. The deciding detector's are those of the reasoner.
         possible: truth: the next subtask could be carried out now.
         reachable: truth: what is left of the plan would reach the goal from here.
     """
@@ -65,6 +108,7 @@ class Judged:
     cause: str = ""
     looks: int = 1
     scores: dict[str, float | None] = field(default_factory=dict, hash=False)
+    named: dict[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
     possible: bool | None = None
     reachable: bool | None = None
 
@@ -74,7 +118,7 @@ class EpisodeRow:
     """One episode.
 
     Args:
-        set: "robofail", "irreversible", "undisturbed" or "harmless".
+        set: of cases, one of `CASE_SETS` or `FURTHER_SETS`.
         task: its name.
         scenario: None for an undisturbed run.
         kind: of the failure, None for an undisturbed run.
@@ -87,8 +131,12 @@ class EpisodeRow:
         threshold: of it.
         without: what was left out ("reasoning", "validation", a part of the score), or None.
         known: position in the starting plan of the first step before which the failure can be
-            known; the plan's length for "after the last step"; None if not failing.
-        effect: position of the step that does the harm, likewise.
+            known; the plan's length for "after the last step"; None if not failing. In the kind
+            household it is what the scenario says. In the honest one, where any run can fail, it is
+            taken from the run that nobody interrupts: the first moment from which on the true plan
+            check says that what is left will not do, but not before what the scenario says.
+        effect: position of the step that does the harm, likewise; in the honest household the
+            first from `known` on that is refused or fails, or the first irreversible harm.
         success: strict check. `weak_success`: REFLECT's own. `failures`: what failed, in words.
         harmed: what must never have happened and did, in words (irreversible).
         harmed_s: simulated time of the first such thing, None without.
@@ -102,6 +150,10 @@ class EpisodeRow:
         simulated_s: robot time.
         compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
         not_judged: moments before a subtask of which the monitor said that nothing was judged.
+        profile: see `Setup`. `model`, `demonstrations`: likewise.
+        slips: how many motions of the robot did not come out as they were meant (truth).
+        causes: truth: facts, as text, that are the reason why the run fails without a monitor; see
+            `tasks.causes`. Empty if not failing, or where none was found.
         implied: whether it was not executed: its detector never alarms on what the unmonitored run
             shows, so that the run is that one.
         provenance: configuration, versions, demonstrations.
@@ -140,17 +192,29 @@ class EpisodeRow:
     reasoning_s: float = 0.0
     implied: bool = False
     not_judged: int = 0
+    profile: str = KIND
+    model: str = EXACT
+    demonstrations: str = PLAIN
+    slips: int = 0
+    causes: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict, hash=False)
 
     @property
     def key(self) -> str:
         """What makes an episode the same one within an experiment."""
-        return row_key(
-            Case(self.set, self.task, self.scenario, self.seed),
+        return self.setup.key(Case(self.set, self.task, self.scenario, self.seed))
+
+    @property
+    def setup(self) -> Setup:
+        """Who watched over it."""
+        return Setup(
             self.strategy,
             self.detector,
             self.threshold,
             self.without,
+            self.profile,
+            self.model,
+            self.demonstrations,
         )
 
     @property

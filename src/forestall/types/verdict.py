@@ -127,6 +127,7 @@ class Verdict:
     discrepancies: tuple[Discrepancy, ...] = ()
     references: int = 0  # demonstrations that there was something to compare with of
     note: str = ""
+    lacking: tuple[Literal, ...] = ()  # facts that should hold and do not, where it knows any
 
     def __post_init__(self) -> None:
         if not isinstance(self.decision, Decision):
