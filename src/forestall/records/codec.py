@@ -38,7 +38,7 @@ from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.types.task import Goal, Task
 
 KIND = "episode"
-RECORD_FORMAT = 2
+RECORD_FORMAT = 3
 _NOTED = ("kind", "format", "task", "end", "boundaries", "executed")
 _MOST_CHANGES = 8  # of scene needs that tell what they were before a change
 
