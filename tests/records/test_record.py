@@ -69,7 +69,7 @@ def test_odd_runs_are_written_too(tmp_path: Path, make: object) -> None:
         ("[]", "not the record of a run"),
         ('{"format": 1, "nodes": []}', "not the record of a run"),
         (json.dumps({"kind": "episode", "format": RECORD_FORMAT + 1}), "this version reads"),
-        (json.dumps({"kind": "episode", "format": 1}), "this version reads 2"),
+        (json.dumps({"kind": "episode", "format": 1}), "this version reads 3"),
         (json.dumps({"kind": "episode", "format": RECORD_FORMAT}), "lacks task"),
     ],
 )
