@@ -9,17 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from forestall.assembly import demonstrations
+from forestall.assembly import recording
 from forestall.assembly.configuration import run_config
-from forestall.assembly.demonstrations import (
-    RecordingJob,
-    jobs_for,
-    keyed,
-    load_memory,
-    ready_made,
-    record_into,
-    record_one,
-)
+from forestall.assembly.demonstrations import load_memory, ready_made
+from forestall.assembly.recording import RecordingJob, jobs_for, keyed, record_into, record_one
 from forestall.config import cache_dir
 from forestall.errors import ForestallError, MemoryFileError
 from forestall.files import alone
@@ -40,7 +33,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> list[RecordingJob]:
         found.append(job)
         return demonstration
 
-    monkeypatch.setattr(demonstrations, "record_one", record)
+    monkeypatch.setattr(recording, "record_one", record)
     return found
 
 

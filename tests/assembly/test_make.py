@@ -10,15 +10,9 @@ import pytest
 
 from assembly.plain_parts import FlatWorlds
 from forestall.assembly.configuration import Given, RunConfig, run_config
-from forestall.assembly.demonstrations import (
-    RecordingJob,
-    jobs_for,
-    load_memory,
-    memory_path,
-    ready_made,
-    record_one,
-)
+from forestall.assembly.demonstrations import load_memory, memory_path, ready_made
 from forestall.assembly.make import make_world, needs_memory, prepare, run_episode
+from forestall.assembly.recording import RecordingJob, jobs_for, record_one
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.load import shipped

@@ -15,13 +15,9 @@ import pytest
 from assembly.plain_parts import FlatWorlds
 from experiments.episodes import computed_row
 from forestall.assembly.configuration import Given, RunConfig, run_config
-from forestall.assembly.demonstrations import (
-    RecordingJob,
-    load_memory,
-    ready_made,
-    record_one,
-)
+from forestall.assembly.demonstrations import load_memory, ready_made
 from forestall.assembly.make import prepare, run_episode
+from forestall.assembly.recording import RecordingJob, record_one
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.errors import InputError

@@ -11,8 +11,8 @@ import pytest
 
 from forestall.assembly.checking import Question, judge_stored
 from forestall.assembly.configuration import Given, run_config
-from forestall.assembly.demonstrations import RecordingJob, record_one
 from forestall.assembly.make import prepare, run_episode
+from forestall.assembly.recording import RecordingJob, record_one
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.load import shipped

@@ -10,9 +10,9 @@ from functools import cache
 from typing import Any
 
 from forestall.assembly.configuration import Given, run_config
-from forestall.assembly.demonstrations import RecordingJob, record_one
 from forestall.assembly.make import prepare
 from forestall.assembly.parts import Assembly
+from forestall.assembly.recording import RecordingJob, record_one
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.model import Domain
 from forestall.kinds import DETECTOR, PERCEIVER, REASONER, REPLANNER, RETRIEVER, VALIDATOR

@@ -24,6 +24,7 @@ from forestall.detection.preconditions import PreconditionConfig, PreconditionDe
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.none import NoReasoning
 from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.domain.distort import Distortion, distorted
 from forestall.errors import InputError
 from forestall.kinds import (
     CAPTIONER,
@@ -45,6 +46,7 @@ from forestall.planning.validate import GraphValidator
 from forestall.replanning.anew import GoalReplanner
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.seams import Detector, Parts, PlanValidator
+from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge, WholeSceneJudge
 from forestall.strategies.online import Online, OnlineScene
 from forestall.strategies.plan_check import PlanChecking
 from forestall.strategies.post_hoc import PostHoc
@@ -53,6 +55,11 @@ from forestall.strategies.watch import Watch
 from forestall.types.kind import Settled
 
 S = TypeVar("S")
+
+_NO_FLOOR = 0.01
+"""The paper has no least similarity of two nodes that are matched."""
+
+_WATCH = signature(Watch).parameters["looks_each"].default
 
 _PROACTIVE, _POST_HOC, _ONLINE, _PLAN_CHECK = (
     signature(strategy).parameters["max_attempts"].default
@@ -226,10 +233,26 @@ def plan_check(parts: Parts, *, max_attempts: int = _PLAN_CHECK) -> PlanChecking
     return PlanChecking(parts.part(REPLANNER), parts.part(VALIDATOR), max_attempts)
 
 
-def watch(parts: Parts) -> Watch:
-    """Every detector and every ablation of the score judges, the paper's own first."""
+def watch(
+    parts: Parts,
+    *,
+    models: tuple[str, ...] = (Distortion.EXACT.value,),
+    model_seed: int = 0,
+    counts: tuple[int, ...] = (),
+    looks_each: int = _WATCH,
+) -> Watch:
+    """Every detector, every ablation of the score and the plan check judge, the paper's own first.
+
+    Args:
+        parts: detectors, retriever, reasoner, demonstrations, domain.
+        models: in each of these models of the domain the plan is checked: exact, coarse or wrong.
+        model_seed: of what a wrong model has wrong.
+        counts: the score and the preconditions judge with so many of the demonstrations, too, the
+            first ones by seed.
+        looks_each: see `strategies.watch`.
+    """
     paper = SceneGraphDetector.name
-    own = [parts.part(DETECTOR, paper, **_shared(parts, paper))]
+    primary = parts.part(DETECTOR, paper, **_shared(parts, paper))
     ablated = [
         parts.part(DETECTOR, paper, **_shared(parts, paper), **{switch: False})
         for switch in SWITCHES.values()
@@ -239,7 +262,57 @@ def watch(parts: Parts) -> Watch:
         for name in parts.declared(DETECTOR)
         if name != paper
     ]
-    return Watch(parts.part(RETRIEVER), [*own, *ablated, *others], parts.part(REASONER))
+    judges: list[Judge] = [
+        *(DetectorJudge(d) for d in (*ablated, *others)),
+        whole_scene(parts),
+        *(_with_model(parts, model, model_seed) for model in models),
+        *(j for n in sorted(set(counts)) for j in _with_few(parts, n)),
+    ]
+    return Watch(parts.part(RETRIEVER), primary, judges, parts.part(REASONER), looks_each)
+
+
+def whole_scene(parts: Parts) -> WholeSceneJudge:
+    """The paper's equations as they stand, on all that is known: nothing is scoped or left out."""
+    domain = parts.domain
+    literal = ScoreConfig(
+        feature=Feature.TEXT,
+        floor=_NO_FLOOR,
+        subtask_floor=_NO_FLOOR,
+        state_changes_match=True,
+        ignored_attributes=(),
+        predicates=tuple(domain.relations),
+        generic_supports=False,
+        merge_supports=False,
+        instance_categories=(),
+    )
+    paper = SceneGraphDetector.name
+    options = _shared(parts, paper)
+    alarm = DetectorConfig(**{k: v for k, v in options.items() if k == "threshold"})
+    scorer = BatchScorer(literal, parts.part(TEXT_ENCODER), domain)
+    wholes = {(d.id, s.index): s.whole for d in parts.demonstrations for s in d.steps}
+    return WholeSceneJudge(SceneGraphDetector(scorer, alarm), wholes, f"{paper}, whole scene")
+
+
+def _with_model(parts: Parts, model: str, seed: int) -> PlanJudge:
+    domain = distorted(parts.domain, model, seed).domain
+    exact = model == Distortion.EXACT.value
+    name = PlanChecking.name if exact else f"{PlanChecking.name}, {model}"
+    return PlanJudge(GraphValidator(domain), name)
+
+
+def _with_few(parts: Parts, count: int) -> list[DetectorJudge]:
+    """The score and the preconditions with the first demonstrations alone."""
+    if count < 1:
+        raise InputError(f"counts {count}: at least 1 demonstration is needed")
+    first = sorted(parts.demonstrations, key=lambda d: (d.seed, d.id))[:count]
+    retriever = EmbeddingRetriever(first, parts.part(TEXT_ENCODER), parts.domain)
+    told = f"{count} demonstration{'s' if count > 1 else ''}"
+    return [
+        DetectorJudge(
+            parts.part(DETECTOR, name, **_shared(parts, name)), retriever, f"{name}, {told}"
+        )
+        for name in (SceneGraphDetector.name, PreconditionDetector.name)
+    ]
 
 
 def _shared(parts: Parts, name: str) -> dict[str, Any]:

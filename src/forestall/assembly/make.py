@@ -51,11 +51,16 @@ PACKAGES = ("numpy", "scipy", "mujoco-core", "embreex", "onnxruntime")
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A checked run: what the files say, before anything is built."""
+    """A checked run: what the files say, before anything is built.
+
+    `model` is the domain as the monitor knows it, where that is another than the task's: what is
+    true, and what is scored, stays as the task has it.
+    """
 
     config: RunConfig
     loaded: LoadedTask
     scenario: Scenario | None
+    model: Domain | None = None
 
     @property
     def plan(self) -> Plan:
@@ -160,6 +165,7 @@ def run_episode(
                         "task": repr(loaded.task),
                         "scenario": repr(prepared.scenario),
                         "domain": digest_of(loaded.domain),
+                        "model": None if prepared.model is None else digest_of(prepared.model),
                     },
                 ),
             ),
@@ -174,12 +180,13 @@ def make_runtime(
 ) -> Runtime:
     """The loop around an open world."""
     config, domain = prepared.config, prepared.loaded.domain
-    parts = Assembly(config.choices, domain, demonstrations, {"truth": world.oracle})
+    known = prepared.model or domain
+    parts = Assembly(config.choices, known, demonstrations, {"truth": world.oracle})
     return Runtime(
         wrap(world.environment, prepared.faults, world.disturbance, domain),
         parts.part(PERCEIVER),
         parts.part(STRATEGY),
-        domain,
+        known,
         listeners,
         _limits(config),
     )

@@ -56,7 +56,7 @@ def record(
         quiet: no progress bar.
     """
     from forestall.assembly.configuration import run_config
-    from forestall.assembly.demonstrations import KITCHENS_PER_TASK, jobs_for, record_into
+    from forestall.assembly.recording import KITCHENS_PER_TASK, jobs_for, record_into
     from forestall.cli.progress import bar
     from forestall.config import DEMONSTRATION_SEEDS
     from forestall.errors import InputError

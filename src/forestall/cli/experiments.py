@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from cyclopts import App, Parameter
 from forestall.cli.flags import ComparingFlags
 
 if TYPE_CHECKING:
+    from forestall.experiments.cost import Cost
     from forestall.statistics.tables import Table
 
 MAIN_TABLES = ("paper",)
@@ -32,9 +34,14 @@ class Options:
         seeds: how many scenes each scenario and task gets (a number, not a range).
         jobs: how many episodes at once; one for each core by default.
         limit: at most so many cases of each set, from all tasks in turn; for a first look.
-        sets: only cases of these sets: robofail, irreversible, undisturbed, harmless.
-        strategies: only runs of these: watch (all detectors judge), none, proactive, online,
-            online-scene, post-hoc. Without watch there are no figures of detectors.
+        sets: only cases of these sets; `forestall cases list` names them.
+        strategies: only runs of these: watch (all judges judge), none, retry-once, proactive,
+            plan-check, online, online-scene, post-hoc. Without watch there are no figures of
+            judges.
+        profiles: of the household: honest (motions go wrong, the domain file does not know all) or
+            kind. Honest by default, both for `all`.
+        quick: a tenth of the cases of each set, with the main strategies.
+        demonstrations: of each task in the honest household, each another way to do it (1 to 32).
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes), ray, or inline (this process, one after the other).
         address: of a running Ray cluster; a local one is started by default.
@@ -50,6 +57,9 @@ class Options:
     limit: int | None = None
     sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
+    profiles: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
+    quick: Flag = False
+    demonstrations: int = 8
     out: Path | None = None
     engine: str = "local"
     address: str | None = None
@@ -120,6 +130,9 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
             options.limit,
             tuple(options.sets or ()),
             tuple(options.strategies or ()),
+            tuple(options.profiles or ()),
+            options.quick,
+            options.demonstrations,
         ),
         options.jobs if options.jobs is not None else os.cpu_count() or 1,
         options.engine,
@@ -127,8 +140,14 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
         Settings(parts.given(), pages=options.pages),
     )
     out = options.out or Path("runs") / f"{name}-{options.split}"
-    with bar("running", quiet=options.quiet or options.as_json) as feed:
-        conduct(experiment, out, feed)
+    quiet = options.quiet or options.as_json
+
+    def announce(cost: Cost) -> None:
+        if not quiet:
+            print(cost.text, file=sys.stderr)
+
+    with bar("running", quiet=quiet) as feed:
+        conduct(experiment, out, feed, announce=announce)
     return _show(*present(out), out, options.as_json)
 
 

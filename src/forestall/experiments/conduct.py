@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from forestall.assembly.configuration import digest_of, run_config
-from forestall.assembly.demonstrations import memory_path, ready_made
-from forestall.assembly.make import needs_memory, prepare
+from forestall.assembly.configuration import RunConfig, digest_of, run_config
+from forestall.assembly.demonstrations import memory_path, ready_made, to_record
+from forestall.assembly.make import needs_memory
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
+from forestall.experiments.cost import Cost, cost_of
 from forestall.experiments.engines import WorkerDiedError, check_engine, computed, make_lanes
 from forestall.experiments.folder import EXPERIMENT, About, ResultsFolder, episodes_in
 from forestall.experiments.runs import (
@@ -25,9 +26,18 @@ from forestall.experiments.runs import (
     Settings,
     by_scene,
 )
-from forestall.experiments.worker import Work, broken_row, config_of, run_one
+from forestall.experiments.worker import (
+    Work,
+    broken_row,
+    config_of,
+    prepared_run,
+    run_one,
+    varied,
+)
 from forestall.memory.store import open_store
-from forestall.statistics.rows import EpisodeRow
+from forestall.statistics.outcomes import NO_STRATEGY
+from forestall.statistics.rows import EXACT, EpisodeRow
+from forestall.tasks.files import load_task
 
 Progress = Callable[[int, int, str], None]
 
@@ -80,6 +90,7 @@ def conduct(
     progress: Progress,
     compute: Callable[[Work], dict[str, Any]] = run_one,
     demonstrate: Callable[[Sequence[Run], Experiment, Progress], None] | None = None,
+    announce: Callable[[Cost], None] | None = None,
 ) -> list[EpisodeRow]:
     """Run what is missing; every row of the experiment in the order of its runs.
 
@@ -89,6 +100,7 @@ def conduct(
         progress: told (done, total, what).
         compute: makes a row; called in the workers.
         demonstrate: called once before, by default to record the demonstrations that are needed.
+        announce: told what it will cost, before anything is run.
 
     Raises:
         InputError: something that does not fit, each with what would be valid.
@@ -100,6 +112,8 @@ def conduct(
         rows = folder.open(experiment.about())
         todo = [r for r in runs if r.key not in rows]
         if todo:
+            if announce is not None:
+                announce(_cost(todo, experiment))
             with folder.effort_of(
                 experiment.choice, experiment.workers, experiment.engine
             ) as count:
@@ -130,14 +144,32 @@ def check(experiment: Experiment, runs: Sequence[Run]) -> None:
             store.required()
     one_each = {r.case: r for r in runs} | {replace(r, case=runs[0].case): r for r in runs}
     for run in one_each.values():
-        prepare(config_of(run, experiment.settings))
+        prepared_run(run, experiment.settings)
 
 
 def _demonstrations(runs: Sequence[Run], experiment: Experiment, progress: Progress) -> None:
-    configs = [config_of(run, experiment.settings) for run in runs]
-    one_each = {c.task: c for c in configs if needs_memory(c) and memory_path(c) is None}
-    for _, config in sorted(one_each.items()):
-        ready_made(config, progress=progress, workers=experiment.workers)
+    for config, ways in _memories(runs, experiment):
+        ready_made(config, progress=progress, workers=experiment.workers, varied=ways)
+
+
+def _memories(runs: Sequence[Run], experiment: Experiment) -> list[tuple[RunConfig, int]]:
+    """A run with each ready-made memory that runs need, and how many ways there are in it."""
+    wanted: dict[tuple[str, str, int], RunConfig] = {}
+    for run in runs:
+        key = (run.profile, run.case.task, varied(run))
+        config = None if key in wanted else config_of(run, experiment.settings)
+        if config is not None and needs_memory(config) and memory_path(config) is None:
+            wanted[key] = config
+    return [(config, key[2]) for key, config in sorted(wanted.items(), key=lambda item: item[0])]
+
+
+def _cost(todo: Sequence[Run], experiment: Experiment) -> Cost:
+    domain = experiment.settings.domain()
+    steps = {task: len(load_task(task, domain).task.plan) for task in {r.case.task for r in todo}}
+    recorded = sum(
+        to_record(config, ways) * steps[config.task] for config, ways in _memories(todo, experiment)
+    )
+    return cost_of([(r, steps[r.case.task]) for r in todo], recorded, experiment.workers)
 
 
 def _computed(
@@ -159,7 +191,7 @@ def _computed(
     with folder.writing() as lines:
         for work, answer in computed(groups, lanes, compute, spared):
             row = (
-                broken_row(work.run, str(answer), prepare(config_of(work.run, work.settings)))
+                broken_row(work.run, str(answer), prepared_run(work.run, work.settings))
                 if isinstance(answer, WorkerDiedError)
                 else EpisodeRow.from_json(answer)
             )
@@ -168,18 +200,26 @@ def _computed(
             yield row
 
 
+RETRY = "retry-once"
+
+_PLAIN: dict[str, Any] = {"without": None, "model": EXACT}
+"""What the watched run of a case has, whatever the others differ in."""
+
+
 def implied(run: Run, rows: Mapping[str, EpisodeRow]) -> EpisodeRow | None:
     """The row of a run that must be the watched one, None where it has to be run.
 
-    Where nobody steps in, and where a baseline detector stays at or above its threshold at every
-    boundary of the watched run, the run is the same, step by step. Runs in which the robot looked
-    twice anywhere are not spared: the second look was the wish of the paper's detector.
+    Where nobody steps in, where there is nothing to repeat, and where a baseline detector stays at
+    or above its threshold at every boundary of the watched run, the run is the same, step by step.
+    Runs in which the robot looked twice anywhere are not spared: who watched wished for that.
     """
-    alone = run.strategy == "none"
+    alone = run.strategy in (NO_STRATEGY, RETRY)
     if not alone and (run.strategy != "proactive" or run.detector == PAPER_DETECTOR):
         return None
-    watched = rows.get(Run(run.case, "watch").key)
+    watched = rows.get(replace(run, strategy="watch", **_PLAIN).key)
     if watched is None or watched.error or any(j.looks > 1 for j in watched.judged):
+        return None
+    if run.strategy == RETRY and watched.refused:
         return None
     scores = [None if alone else j.scores.get(run.detector) for j in watched.judged]
     if any(s is not None and s < run.threshold for s in scores):
@@ -189,8 +229,9 @@ def implied(run: Run, rows: Mapping[str, EpisodeRow]) -> EpisodeRow | None:
         strategy=run.strategy,
         detector=run.detector,
         threshold=run.threshold,
+        model=run.model,
         judged=tuple(
-            replace(j, score=s, decision="proceed", confirmed=False, cause="", scores={})
+            replace(j, score=s, decision="proceed", confirmed=False, cause="", scores={}, named={})
             for j, s in zip(watched.judged, scores, strict=True)
         ),
         planner_calls=0,

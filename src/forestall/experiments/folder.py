@@ -248,6 +248,9 @@ class ResultsFolder(Generic[R]):
                 c.limit,
                 tuple(c.sets),
                 tuple(c.strategies),
+                tuple(c.profiles),
+                c.quick,
+                c.demonstrations,
             )
             for c in (call.choice for call in self._calls(ExperimentCall))
         ]

@@ -17,9 +17,9 @@ from forestall.experiments.worker import PAGES
 from forestall.files import replace_file
 from forestall.kinds import CAPTIONER, IMAGE_ENCODER
 from forestall.report.experiment_page import write_experiment
-from forestall.statistics.cases import CASE_SETS, cases
+from forestall.statistics.cases import Case, cases
 from forestall.statistics.findings import findings
-from forestall.statistics.rows import EpisodeRow
+from forestall.statistics.rows import HONEST, EpisodeRow
 from forestall.statistics.summary import summary as summarised
 from forestall.statistics.tables import Table, tables
 
@@ -100,14 +100,18 @@ def _missing(
     """What was asked for and is not there, and what was not asked for."""
     wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
     lacking = Counter(
-        f"{run.strategy} on {run.case.set}" for key, run in wanted.items() if key not in found
+        f"{run.strategy} on {run.case.set}, {run.profile}"
+        for key, run in wanted.items()
+        if key not in found
     )
     notes = [f"missing: {count} episodes of {what}" for what, count in lacking.items()]
-    for of in CASE_SETS:
-        whole = len(cases(of, about["split"], about["rounds"]))
-        used = len({run.case for run in wanted.values() if run.case.set == of})
-        if used < whole:
-            notes.append(f"asked for: {used} of {whole} cases of {of}")
+    used: dict[tuple[str, str], set[Case]] = {}
+    for run in wanted.values():
+        used.setdefault((run.profile, run.case.set), set()).add(run.case)
+    for (profile, of), there in used.items():
+        whole = len(cases(of, about["split"], about["rounds"], further=profile == HONEST))
+        if len(there) < whole:
+            notes.append(f"asked for: {len(there)} of {whole} cases of {of}, {profile}")
     return notes
 
 

@@ -7,9 +7,10 @@ them: the paper's detector sometimes asks for a second look, which takes the rob
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
+from itertools import product
 from typing import Any
 
 from forestall.assembly.configuration import Choice as Part
@@ -18,9 +19,10 @@ from forestall.assembly.registry import find
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, STRATEGY
-from forestall.statistics.cases import CASE_SETS, UNDISTURBED, Case, cases
-from forestall.statistics.metrics import THRESHOLDS
-from forestall.statistics.rows import EXACT, KIND, PLAIN, Setup
+from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
+from forestall.statistics.metrics import PAPER_SET, THRESHOLDS
+from forestall.statistics.rows import EXACT, HONEST, KIND, PLAIN, Setup
+from forestall.tasks.variation import MOST
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "all")
 
@@ -28,6 +30,28 @@ PAGES = ("all", "telling", "none")
 """Telling are the proactive runs of failing cases, and those in which it raised a false alarm."""
 
 BASELINES = ("objects", "caption", "image")
+
+PROFILES = (HONEST, KIND)
+
+MODELS = (EXACT, "coarse", "wrong")
+"""What the monitor's domain is like; in the watched runs the plan is checked in all of them."""
+
+ALONE = ("watch", "none", "retry-once")
+"""Nobody judges in these, or nobody acts on it; run on every case."""
+
+BEFORE, AFTER = ("proactive", "plan-check"), ("online", "online-scene", "post-hoc")
+"""Strategies that step in before a subtask, and after one."""
+
+IRREVERSIBLE = "irreversible"
+
+DEMONSTRATIONS = 8
+"""Of each task in the honest household."""
+
+PART = 1 / 4
+"""Of the cases of each set, in the honest household, in which strategies step in."""
+
+QUICK = 1 / 10
+"""Of the cases of each set in a quick experiment."""
 
 PAPER_DETECTOR = "scene-graph"
 
@@ -96,8 +120,8 @@ class Run:
     demonstrations: str = PLAIN
 
     @property
-    def key(self) -> str:
-        """As `EpisodeRow.key`."""
+    def setup(self) -> Setup:
+        """Who watches over it, and what he knows."""
         return Setup(
             self.strategy,
             self.detector,
@@ -106,12 +130,17 @@ class Run:
             self.profile,
             self.model,
             self.demonstrations,
-        ).key(self.case)
+        )
 
     @property
-    def scene(self) -> tuple[str, int]:
+    def key(self) -> str:
+        """As `EpisodeRow.key`."""
+        return self.setup.key(self.case)
+
+    @property
+    def scene(self) -> tuple[str, str, int]:
         """Runs of one scene see much the same and are done by one worker."""
-        return self.case.task, self.case.seed
+        return self.profile, self.case.task, self.case.seed
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +154,9 @@ class Choice:
         limit: cases of each set at most, taken from all tasks in turn; all by default.
         sets: only cases of these; all by default.
         strategies: only these; all by default.
+        profiles: of the household; by default the honest one, and for "all" both.
+        quick: a tenth of the cases of each set, and the main strategies alone.
+        demonstrations: of each task in the honest household, each another way to do it.
     """
 
     experiment: str
@@ -133,6 +165,9 @@ class Choice:
     limit: int | None = None
     sets: tuple[str, ...] = ()
     strategies: tuple[str, ...] = ()
+    profiles: tuple[str, ...] = ()
+    quick: bool = False
+    demonstrations: int = DEMONSTRATIONS
 
     def runs(self) -> tuple[Run, ...]:
         """See `runs_for`."""
@@ -147,30 +182,21 @@ class Choice:
         of_set = not self.sets or run.case.set in self.sets
         return of_set and (not self.strategies or run.strategy in self.strategies)
 
+    def households(self) -> tuple[str, ...]:
+        """The profiles that it runs in, the honest one first."""
+        default = PROFILES if self.experiment == "all" else (HONEST,)
+        return tuple(p for p in PROFILES if p in (self.profiles or default))
+
 
 def runs_for(choice: Choice) -> tuple[Run, ...]:
     """The wanted episodes, each once, the watched run of a case first.
 
     Raises:
-        UnknownNameError: no such experiment, split, set or strategy.
+        UnknownNameError: no such experiment, split, set, strategy or profile.
         InputError: a limit below 1, or nothing that fits.
     """
     _check(choice)
-    sets = {of: _limited(cases(of, choice.split, choice.rounds), choice.limit) for of in CASE_SETS}
-    runs = [Run(c, s) for of in CASE_SETS for c in sets[of] for s in ("watch", "none")]
-    if choice.experiment in ("proactive", "all"):
-        for strategy in ("proactive", "online", "online-scene", "post-hoc"):
-            runs += [Run(c, strategy) for c in sets["irreversible"]]
-        for of in ("robofail", UNDISTURBED, "harmless"):
-            runs += [Run(c, "proactive") for c in sets[of]]
-    if choice.experiment in ("detection", "all"):
-        for detector in (PAPER_DETECTOR, *BASELINES):
-            for threshold in THRESHOLDS:
-                runs += [Run(c, "proactive", detector, threshold) for c in sets["robofail"]]
-    if choice.experiment in ("ablation", "all"):
-        runs += [Run(c, "proactive") for c in sets["robofail"]]
-        for part in ("reasoning", "validation"):
-            runs += [Run(c, "proactive", without=part) for c in sets["robofail"]]
+    runs = [run for profile in choice.households() for run in _in(profile, choice)]
     wanted = tuple(run for run in dict.fromkeys(runs) if choice.takes(run))
     if not wanted:
         raise InputError(
@@ -180,14 +206,66 @@ def runs_for(choice: Choice) -> tuple[Run, ...]:
     return wanted
 
 
+def _in(profile: str, choice: Choice) -> Iterator[Run]:
+    """The episodes of an experiment in one household."""
+    of_sets = _sets(profile, choice)
+    honest = profile == HONEST
+    told = f"{choice.demonstrations} varied" if honest else PLAIN
+    run = partial(Run, profile=profile, demonstrations=told)
+    yield from (run(case, s) for found in of_sets.values() for case in found for s in ALONE)
+    if choice.experiment in ("proactive", "all"):
+        for of, found in of_sets.items():
+            for case in _part(found, choice.quick) if honest else found:
+                yield from _stepping_in(case, run, choice.quick and of != IRREVERSIBLE)
+    robofail = of_sets[PAPER_SET]
+    if choice.experiment == "detection":
+        for case, detector in product(robofail, (PAPER_DETECTOR, *BASELINES)):
+            yield from (run(case, "proactive", detector, t) for t in THRESHOLDS)
+    if choice.experiment == "ablation" or (choice.experiment == "all" and not honest):
+        for case in robofail if choice.experiment == "ablation" else _part(robofail, choice.quick):
+            yield run(case, "proactive")
+            yield from (run(case, "proactive", without=p) for p in ("reasoning", "validation"))
+
+
+def _stepping_in(case: Case, run: Callable[..., Run], briefly: bool) -> Iterator[Run]:
+    """The strategies that step in, on one case; `briefly`: those before a subtask alone."""
+    yield from (run(case, s) for s in BEFORE)
+    honest = run(case, "none").profile == HONEST
+    if not briefly and (honest or case.set == IRREVERSIBLE):
+        yield from (run(case, s) for s in AFTER)
+    if honest:
+        yield from (run(case, s, model=m) for m in MODELS[1:] for s in BEFORE)
+
+
+def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
+    """The cases of every set that is run in a household."""
+    honest = profile == HONEST
+    found = {}
+    for of in (*CASE_SETS, *FURTHER_SETS) if honest else CASE_SETS:
+        every = cases(of, choice.split, choice.rounds, further=honest)
+        limit = max(1, round(len(every) * QUICK)) if choice.quick else choice.limit
+        found[of] = _limited(every, limit)
+    return found
+
+
+def _part(found: Sequence[Case], quick: bool) -> Sequence[Case]:
+    """A balanced part of the cases of a set: so many of every task."""
+    return found if quick else _limited(found, max(1, round(len(found) * PART)))
+
+
 def _check(choice: Choice) -> None:
     if choice.experiment not in EXPERIMENTS:
         raise UnknownNameError("experiment", choice.experiment, EXPERIMENTS)
     if choice.limit is not None and choice.limit < 1:
         raise InputError(f"--limit {choice.limit}: at least 1 case of each set is needed")
+    if not 1 <= choice.demonstrations <= MOST:
+        raise InputError(f"--demonstrations {choice.demonstrations}: 1 to {MOST} are possible")
     for name in choice.sets:
-        if name not in CASE_SETS:
-            raise UnknownNameError("set of cases", name, CASE_SETS)
+        if name not in (*CASE_SETS, *FURTHER_SETS):
+            raise UnknownNameError("set of cases", name, (*CASE_SETS, *FURTHER_SETS))
+    for name in choice.profiles:
+        if name not in PROFILES:
+            raise UnknownNameError("profile of the household", name, PROFILES)
     for name in choice.strategies:
         find(STRATEGY.name, name)
 
@@ -197,11 +275,11 @@ def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
 
     Runs of one case see the most alike; after the undisturbed one come those in the same room.
     """
-    groups: dict[tuple[str, int], dict[Case, list[Run]]] = {}
+    groups: dict[tuple[str, str, int], dict[Case, list[Run]]] = {}
     for run in runs:
         groups.setdefault(run.scene, {}).setdefault(run.case, []).append(run)
     return [
-        [run for case in sorted(of, key=lambda c: c.set != UNDISTURBED) for run in of[case]]
+        [run for case in sorted(of, key=lambda c: c.scenario is not None) for run in of[case]]
         for of in groups.values()
     ]
 

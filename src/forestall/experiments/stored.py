@@ -59,6 +59,9 @@ class Chosen(_Model):
     limit: int | None
     sets: list[str]
     strategies: list[str]
+    profiles: list[str]
+    quick: bool
+    demonstrations: int
 
 
 class Call(_Model):

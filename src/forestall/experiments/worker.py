@@ -6,7 +6,7 @@ Whatever goes wrong in an episode becomes a row that says so: it counts as a fai
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,16 @@ from typing import Any
 from forestall.assembly.configuration import Choice, Given, RunConfig, run_config
 from forestall.assembly.demonstrations import load_memory
 from forestall.assembly.make import Prepared, make_world, needs_memory, prepare, run_episode
+from forestall.domain.distort import distorted
 from forestall.errors import ForestallError
-from forestall.experiments.runs import Run, Settings
+from forestall.experiments.runs import MODELS, Run, Settings
 from forestall.kinds import WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
 from forestall.seams import WorldPart
-from forestall.statistics.rows import EpisodeRow, Judged
+from forestall.statistics.metrics import WATCH
+from forestall.statistics.rows import EXACT, KIND, PLAIN, EpisodeRow, Judged
 from forestall.tasks.faults import knowable
 from forestall.tasks.truth import TruthTrace
 from forestall.types.decision import Outcome
@@ -70,22 +72,56 @@ class Work:
 def config_of(run: Run, settings: Settings) -> RunConfig:
     """The run as `assembly` wants it."""
     case = run.case
+    strategy: dict[str, Any] = {"name": run.strategy}
+    if run.strategy == WATCH:
+        strategy |= {"models": MODELS, "model_seed": case.seed, "counts": counts_of(run)}
     return run_config(
         case.task,
         case.scenario,
         seed=case.seed,
         without=run.without,
         keep_observations=False,
-        given=settings.given.over(Given.named({"limit": UNLIMITED})),
-        strategy=run.strategy,
+        given=_household(run.profile, settings).over(Given.named({"limit": UNLIMITED})),
+        strategy=strategy,
         detector={"name": run.detector, "threshold": run.threshold},
     )
+
+
+def counts_of(run: Run) -> tuple[int, ...]:
+    """With how many of the demonstrations judges are watched, where they differ from each other."""
+    count = varied(run)
+    return tuple(2**k for k in range(count.bit_length()) if 2**k <= count)
+
+
+def varied(run: Run) -> int:
+    """How many varied demonstrations a run has, 0 where they are plain."""
+    return 0 if run.demonstrations == PLAIN else int(run.demonstrations.split()[0])
+
+
+def _household(profile: str, settings: Settings) -> Given:
+    """What was said of the parts, in one profile of the household."""
+    if profile == KIND:
+        return settings.given
+    return Given.named({"world.profile": profile}).over(settings.given)
+
+
+def prepared_run(run: Run, settings: Settings) -> Prepared:
+    """The checked run, with the model that its monitor has of the domain.
+
+    Raises:
+        InputError: see `prepare`.
+    """
+    prepared = prepare(config_of(run, settings))
+    if run.model == EXACT:
+        return prepared
+    model = distorted(prepared.loaded.domain, run.model, run.case.seed).domain
+    return replace(prepared, model=model)
 
 
 def run_one(work: Work) -> dict[str, Any]:
     """Run an episode; its row as plain data."""
     run = work.run
-    prepared = prepare(config_of(run, work.settings))
+    prepared = prepared_run(run, work.settings)
     trace = TruthTrace()
     try:
         return _row(run, prepared, _record(work, prepared, trace), trace).to_json()
@@ -121,7 +157,8 @@ def broken_row(run: Run, error: str, prepared: Prepared) -> EpisodeRow:
 def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
     demonstrations, memory = None, None
     if needs_memory(prepared.config):
-        demonstrations, memory = _memory(work.run.case.task, work.settings)
+        run = work.run
+        demonstrations, memory = _memory(run.case.task, run.profile, varied(run), work.settings)
     folder = work.page_folder
     recorder = None if folder is None else RunRecorder(folder, page="index.html")
     listeners = [] if recorder is None else [recorder]
@@ -202,6 +239,9 @@ def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
         "detector": run.detector,
         "threshold": run.threshold,
         "without": run.without,
+        "profile": run.profile,
+        "model": run.model,
+        "demonstrations": run.demonstrations,
         "known": moments[0] if failing else None,
         "effect": moments[1] if failing else None,
     }
@@ -231,9 +271,23 @@ def _judged(
         cause="" if diagnosis is None else diagnosis.cause,
         looks=boundary.looks,
         scores={v.detector: v.score for v in boundary.watched},
+        named=_named(boundary),
         possible=possible,
         reachable=reachable,
     )
+
+
+def _named(boundary: BoundaryRecord) -> dict[str, tuple[str, ...]]:
+    """The facts that each judge with an alarm says must change."""
+    found = {
+        v.detector: tuple(map(str, v.lacking))
+        for v in boundary.watched
+        if v.lacking and v.score is not None and v.score < v.threshold
+    }
+    verdict, diagnosis = boundary.verdict, boundary.diagnosis
+    if verdict is not None and diagnosis is not None and diagnosis.must_change:
+        found[verdict.detector] = tuple(map(str, diagnosis.must_change))
+    return found
 
 
 _worlds: dict[Choice, WorldPart] = {}
@@ -249,10 +303,12 @@ def _world(prepared: Prepared) -> WorldPart:
 
 
 @cache
-def _memory(task: str, settings: Settings) -> tuple[tuple[Demonstration, ...], str]:
-    config = run_config(task, given=settings.given)
-    demonstrations, path = load_memory(config, workers=1)
+def _memory(
+    task: str, profile: str, ways: int, settings: Settings
+) -> tuple[tuple[Demonstration, ...], str]:
+    config = run_config(task, given=_household(profile, settings))
+    demonstrations, path = load_memory(config, workers=1, varied=ways)
     return tuple(demonstrations), path
 
 
-__all__ = ["PAGES", "Work", "broken_row", "config_of", "run_one"]
+__all__ = ["PAGES", "Work", "broken_row", "config_of", "prepared_run", "run_one", "varied"]

@@ -25,7 +25,7 @@ SPLITS = {"development": 10_000, "test": 20_000}
 """First seed of each split. Nothing is fitted, chosen or looked at on seeds of "test"."""
 
 FURTHER_SPLITS = {"development": 10_000, "test": 40_000}
-"""The same for the further sets."""
+"""The same for the further sets, and for all sets in the honest household."""
 
 SCENES_PER_TASK = 10
 """Seeds of one round: the k-th scenario of a task (and of a set) has the k-th scene, in turn."""
@@ -68,13 +68,15 @@ class Case:
         return Case(plain, self.task, None, self.seed)
 
 
-def cases(of: str, split: str, rounds: int = 1) -> tuple[Case, ...]:
+def cases(of: str, split: str, rounds: int = 1, further: bool = False) -> tuple[Case, ...]:
     """All cases of a set in a split, in a fixed order.
 
     Args:
         of: one of `CASE_SETS` or `FURTHER_SETS`.
         split: "development" or "test".
         rounds: how many scenes each scenario gets.
+        further: whether the set has the rooms of the further sets, as those always have: what all
+            sets are run in is then the same rooms, and every case has its undisturbed twin.
 
     Raises:
         UnknownNameError: no such set or split.
@@ -84,7 +86,7 @@ def cases(of: str, split: str, rounds: int = 1) -> tuple[Case, ...]:
         raise UnknownNameError("set of cases", of, (*CASE_SETS, *FURTHER_SETS))
     if split not in SPLITS:
         raise UnknownNameError("split", split, SPLITS)
-    first = (FURTHER_SPLITS if of in FURTHER_SETS else SPLITS)[split]
+    first = (FURTHER_SPLITS if further or of in FURTHER_SETS else SPLITS)[split]
     if not 1 <= rounds <= SPLITS["development"] // ROUND:
         raise InputError(
             f"{rounds} seeds for each scenario: 1 to {SPLITS['development'] // ROUND} are possible"

@@ -1,8 +1,8 @@
-"""The plan as given, judged by several detectors at once and never interrupted.
+"""The plan as given, judged by many judges at once and never interrupted.
 
-Called by the runtime at each boundary; retriever, detectors and reasoner come through the
-constructor. One such run gives every detector the same observations, so that they can be compared
-boundary by boundary.
+Called by the runtime at each boundary; retriever, judges and reasoner come through the constructor.
+One such run gives every judge the same observations, so that they can be compared boundary by
+boundary.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from forestall.errors import InputError
 from forestall.seams import Detector, Reasoner, Retriever
 from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock
+from forestall.strategies.judges import Judge
 from forestall.types.episode import SkillOutcome
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
-from forestall.types.verdict import Decision
+from forestall.types.verdict import Decision, Verdict
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
 
@@ -25,36 +26,47 @@ _GO_ON = StrategyAnswer(Decision.PROCEED)
 class Watch:
     """Judges each subtask before it starts, and lets it start.
 
-    The first detector is the primary one: it alone may ask for another look, so that what is seen
-    until its first alarm is what a proactive run with it would see. Its alarm is diagnosed, and
-    stays in the record as an alarm that nothing came of.
+    The detector is the primary judge: it asks for another look whenever it wants one, and its alarm
+    is diagnosed and stays in the record as an alarm that nothing came of. Every other judge has a
+    few looks of its own in a run; all of them judge what is seen then.
 
     Args:
-        retriever: finds the references, the same for all.
-        detectors: the primary one first; their names tell them apart.
+        retriever: finds the references, the same for all that bring none of their own.
+        detector: the primary judge.
+        judges: the others; their names tell them apart.
         reasoner: explains the primary one's alarms.
+        looks_each: before how many subtasks of a run each of the others may ask for another look.
 
     Raises:
-        InputError: no detector, or two of the same name.
+        InputError: two of the same name.
     """
 
     name = "watch"
     looks_after = LooksAfter.NOTHING
 
     def __init__(
-        self, retriever: Retriever, detectors: Sequence[Detector], reasoner: Reasoner
+        self,
+        retriever: Retriever,
+        detector: Detector,
+        judges: Sequence[Judge],
+        reasoner: Reasoner,
+        looks_each: int = 2,
     ) -> None:
-        if not detectors:
-            raise InputError("there is nothing to watch with: give at least one detector")
-        twice = sorted(n for n, count in Counter(d.name for d in detectors).items() if count > 1)
+        names = [detector.name, *(j.name for j in judges)]
+        twice = sorted(n for n, count in Counter(names).items() if count > 1)
         if twice:
-            raise InputError(f"several detectors are called {', '.join(twice)}")
+            raise InputError(f"several judges are called {', '.join(twice)}")
         self._retriever = AskedRetriever(retriever)
-        self._primary, *self._others = (AskedDetector(d) for d in detectors)
+        self._primary = AskedDetector(detector)
+        self._judges = tuple(judges)
         self._reasoner = AskedReasoner(reasoner)
+        self._looks_each = looks_each
+        self._asked: Counter[str] = Counter()
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
-        """Let every detector judge; on an alarm of the primary one, diagnose; go on."""
+        """Let every judge judge; on an alarm of the primary one, diagnose; go on."""
+        if context.index == 0 and context.looks == 1:
+            self._asked.clear()
         clock = Clock()
         references = tuple(
             self._retriever.retrieve(context.subtask, context.task.name, context.done)
@@ -67,17 +79,32 @@ class Watch:
             if context.may_look:
                 return StrategyAnswer(Decision.LOOK_AGAIN, verdict, seconds=clock.items())
             verdict = replace(verdict, decision=Decision.REPLAN)
+        others = [judge.judge(context) for judge in self._judges]
+        clock.lap("watch")
+        if context.may_look and (asking := self._asking(others)):
+            self._asked.update(asking)
+            wanted = replace(verdict, decision=Decision.LOOK_AGAIN)
+            why = f"another look for {', '.join(asking)}"
+            return StrategyAnswer(Decision.LOOK_AGAIN, wanted, why=why, seconds=clock.items())
         diagnosis = None
         if verdict.decision is Decision.REPLAN:
             diagnosis = self._reasoner.diagnose(context, verdict)
             clock.lap("diagnose")
-        watched = [verdict]
-        for detector in self._others:
-            watched.append(detector.judge(context.scoped, context.observation, references))
-            clock.lap("watch")
         return StrategyAnswer(
-            Decision.PROCEED, verdict, diagnosis, seconds=clock.items(), watched=tuple(watched)
+            Decision.PROCEED,
+            verdict,
+            diagnosis,
+            seconds=clock.items(),
+            watched=(verdict, *others),
         )
+
+    def _asking(self, verdicts: Sequence[Verdict]) -> list[str]:
+        """Judges that want another look and have not had theirs."""
+        return [
+            v.detector
+            for v in verdicts
+            if v.decision is Decision.LOOK_AGAIN and self._asked[v.detector] < self._looks_each
+        ]
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
         """Go on."""
