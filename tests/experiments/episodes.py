@@ -6,8 +6,7 @@ import os
 from dataclasses import replace
 from typing import Any
 
-from forestall.assembly.make import prepare
-from forestall.experiments.worker import Work, broken_row, config_of
+from forestall.experiments.worker import Work, broken_row, prepared_run
 from forestall.statistics.rows import EpisodeRow, Judged
 
 DEADLY = "boil-water"
@@ -17,7 +16,7 @@ DEADLY = "boil-water"
 def computed_row(work: Work) -> dict[str, Any]:
     """A row with scores, drawn from the run's key."""
     run = work.run
-    empty = broken_row(run, "", prepare(config_of(run, work.settings)))
+    empty = broken_row(run, "", prepared_run(run, work.settings))
     good = run.strategy == "proactive" or not run.case.failing
     low = 0.8 if run.case.failing else 0.95
     judged = tuple(

@@ -17,12 +17,12 @@ from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, EFFORT, ROWS, ResultsFolder, episodes_in
 from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
-from forestall.statistics.cases import CASE_SETS, Case, cases
+from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
 
 pytestmark = pytest.mark.slow
 
-CHOICE = Choice("proactive", "development", limit=2)
+CHOICE = Choice("proactive", "development", limit=2, profiles=("kind",))
 SMALL = Experiment(CHOICE, workers=2)
 
 
@@ -56,12 +56,45 @@ def test_splits_share_no_seed_and_every_failing_case_has_its_twin() -> None:
         cases("robofail", "dev")
 
 
-def test_all_holds_every_other_experiment_and_each_episode_once() -> None:
+def test_all_holds_the_strategies_in_both_households_and_each_episode_once() -> None:
     everything = runs_for(Choice("all"))
     assert len(set(everything)) == len(everything)
     assert len({r.key for r in everything}) == len(everything)
-    for name in ("proactive", "detection", "ablation"):
-        assert set(runs_for(Choice(name))) <= set(everything)
+    assert set(runs_for(Choice("proactive", profiles=("kind", "honest")))) <= set(everything)
+    assert {r.profile for r in runs_for(Choice("proactive"))} == {"honest"}, "unless it is said"
+    honest = [r for r in everything if r.profile == "honest"]
+    assert {r.case.set for r in honest} == {*CASE_SETS, *FURTHER_SETS}
+    assert {r.case.set for r in everything if r.profile == "kind"} == set(CASE_SETS)
+    watched = {r.case for r in honest if r.strategy == "watch"}
+    assert {c.twin for c in watched} <= watched
+    acted = {s: {r.case for r in honest if r.strategy == s} for s in ("proactive", "post-hoc")}
+    assert acted["proactive"] == acted["post-hoc"], "compared on the same cases"
+    assert {(r.strategy, r.model) for r in honest} >= {
+        (s, m) for s in ("proactive", "plan-check") for m in ("exact", "coarse", "wrong")
+    }
+
+
+def test_a_quick_experiment_is_a_balanced_tenth() -> None:
+    quick, whole = (runs_for(Choice("all", quick=q)) for q in (True, False))
+    assert set(quick) <= set(whole) | {r for r in quick if r.strategy not in ("watch", "none")}
+    for of in (*CASE_SETS, *FURTHER_SETS):
+        cases_of = {r.case for r in quick if r.case.set == of and r.profile == "honest"}
+        every = len(cases(of, "test", further=True))
+        assert len(cases_of) == max(1, round(every / 10))
+        assert len({c.task for c in cases_of}) == min(
+            len(cases_of), len({c.task for c in cases(of, "test")})
+        )
+
+
+def test_what_is_not_possible_is_said_with_what_is() -> None:
+    for name in ("detection", "ablation"):
+        assert runs_for(Choice(name, profiles=("kind",)))
+    for wrong, why in (
+        (Choice("all", profiles=("kindly",)), "did you mean kind"),
+        (Choice("all", demonstrations=33), "1 to 32"),
+    ):
+        with pytest.raises(InputError, match=why):
+            runs_for(wrong)
     with pytest.raises(InputError, match="ablation"):
         runs_for(Choice("ablations"))
     some = runs_for(Choice("all", sets=("robofail",), strategies=("proactive",)))
@@ -70,13 +103,21 @@ def test_all_holds_every_other_experiment_and_each_episode_once() -> None:
         with pytest.raises(InputError, match="did you mean"):
             runs_for(wrong)
     with pytest.raises(InputError, match="no run of strategy online on undisturbed"):
-        runs_for(Choice("proactive", sets=("undisturbed",), strategies=("online",)))
+        runs_for(
+            Choice(
+                "proactive",
+                sets=("undisturbed",),
+                strategies=("online",),
+                profiles=("kind",),
+            )
+        )
     with pytest.raises(InputError, match="limit"):
         runs_for(Choice("all", limit=0))
 
 
 def test_a_limit_takes_cases_of_all_tasks_in_turn() -> None:
-    runs = [r for r in runs_for(Choice("proactive", limit=10)) if r.case.set == "robofail"]
+    chosen = Choice("proactive", limit=10, profiles=("kind",))
+    runs = [r for r in runs_for(chosen) if r.case.set == "robofail"]
     assert len({r.case.task for r in runs}) == 10
     assert len({r.case for r in runs}) == 10
 
@@ -85,7 +126,8 @@ def test_the_unmonitored_run_of_a_case_comes_first_within_its_scene() -> None:
     for group in by_scene(runs_for(Choice("all", limit=5))):
         assert len({r.scene for r in group}) == 1
         for run in group:
-            assert group.index(Run(run.case, "watch")) <= group.index(run)
+            alone = replace(run, strategy="watch", without=None, model="exact")
+            assert group.index(alone) <= group.index(run)
 
 
 def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
@@ -118,7 +160,7 @@ def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_pat
 def test_results_of_other_code_or_settings_are_not_mixed_in(tmp_path: Path) -> None:
     play(SMALL, tmp_path)
     with pytest.raises(InputError, match="split"):
-        play(replace(SMALL, choice=Choice("proactive", limit=2)), tmp_path)
+        play(replace(SMALL, choice=replace(CHOICE, split="test")), tmp_path)
     with pytest.raises(InputError, match="states"):
         play(replace(SMALL, settings=Settings(Given.named({"states": "oracle"}))), tmp_path)
     about = json.loads((tmp_path / ABOUT).read_text())

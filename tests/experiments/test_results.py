@@ -31,7 +31,9 @@ def _few_draws(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def made(out: Path, workers: int) -> None:
     engine = "inline" if workers == 1 else "local"
-    experiment = Experiment(Choice("all", "development", limit=4), workers, engine)
+    experiment = Experiment(
+        Choice("all", "development", limit=4, profiles=("kind",)), workers, engine
+    )
     conduct(experiment, out, lambda *a: None, computed_row, lambda *a: None)
 
 
