@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import lzma
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -85,3 +87,36 @@ def test_a_description_that_is_none(
     assert call(["bench", "report", str(folder)]) == 2
     told = capsys.readouterr().err
     assert says in told and told.count("\n") == 1
+
+
+def test_packed_rows_give_the_same_tables_elsewhere(tmp_path: Path) -> None:
+    whole, packed, out = tmp_path / "whole", tmp_path / "packed", tmp_path / "out"
+    shutil.copytree(MADE, whole)
+    shutil.copytree(MADE, packed)
+    rows = packed / ROWS
+    rows.with_name(f"{ROWS}.xz").write_bytes(lzma.compress(rows.read_bytes()))
+    rows.unlink()
+    assert call(["bench", "report", str(whole)]) == 0
+    assert call(["bench", "report", str(packed), "--out", str(out)]) == 0
+    for table in (whole / "tables").iterdir():
+        assert (out / "tables" / table.name).read_bytes() == table.read_bytes()
+    assert not (packed / "tables").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (b"no xz at all", "packed with xz"),
+        (lzma.compress(b'{"format": 2}\n' * 999)[:-30], "cut off|packed with xz"),
+        (lzma.compress(b"\xff\xfe\n"), "not UTF-8 text"),
+    ],
+)
+def test_damaged_packed_rows_are_named(
+    tmp_path: Path, content: bytes, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(MADE, tmp_path / "all")
+    (tmp_path / "all" / ROWS).unlink()
+    (tmp_path / "all" / f"{ROWS}.xz").write_bytes(content)
+    assert call(["bench", "report", str(tmp_path / "all")]) == 2
+    error = capsys.readouterr().err
+    assert re.search(f"{ROWS}.xz .*({why})", error), error

@@ -96,17 +96,19 @@ def report(
     folder: Path,
     /,
     *,
+    out: Path | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> int:
     """Make the tables, figures and page of a folder of results again; nothing is run.
 
     Args:
-        folder: where an experiment left its results.
+        folder: where an experiment left its results; its episodes may be packed with xz.
+        out: folder to write to; that of the results by default.
         as_json: print the summary as JSON instead of tables.
     """
     from forestall.experiments.results import present
 
-    return _show(*present(folder), folder, as_json)
+    return _show(*present(folder, out), out or folder, as_json)
 
 
 def register(bench: App) -> None:

@@ -21,7 +21,14 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.runs import Choice
-from forestall.experiments.stored import AnyAbout, Call, ExperimentAbout, ExperimentCall, lines_of
+from forestall.experiments.stored import (
+    PACKED,
+    AnyAbout,
+    Call,
+    ExperimentAbout,
+    ExperimentCall,
+    lines_of,
+)
 from forestall.files import alone, make_folder, replace_file
 from forestall.fingerprint import ROW_MAKING, sources_digest, weights_of
 from forestall.reading.documents import read_json
@@ -151,10 +158,11 @@ class ResultsFolder(Generic[R]):
             FileFormatError: a line that is no episode of this version.
         """
         file = self.path / ROWS
-        if not file.exists():
+        packed = file.with_name(file.name + PACKED)
+        if not file.exists() and not packed.exists():
             return {}
-        lines, whole, half = lines_of(file)
-        if half and mend:
+        lines, whole, half = lines_of(file if file.exists() else packed)
+        if half and mend and file.exists():
             replace_file(file, whole.encode())
         rows = {}
         for place, data in lines:

@@ -14,7 +14,7 @@ from forestall.errors import FileFormatError, InputError
 from forestall.experiments.folder import ResultsFolder, episodes_in
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
-from forestall.files import replace_file
+from forestall.files import make_folder, replace_file
 from forestall.kinds import CAPTIONER, IMAGE_ENCODER
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import Case, cases
@@ -32,22 +32,25 @@ STAND_INS = {
 """(detector, what it works with) → how it is called where people read it."""
 
 
-def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
+def present(path: Path, out: Path | None = None) -> tuple[dict[str, Any], tuple[Table, ...]]:
     """Write `summary.json`, tables, figures and the page of a folder of results.
 
     Args:
         path: the folder.
+        out: where to; the folder itself by default.
 
     Raises:
         FileFormatError: it holds no experiment, or no episode.
     """
     data, rows, meta, names = summary_of(path)
     made = tables(data)
-    replace_file(path / SUMMARY, (json.dumps(data, indent=1) + "\n").encode())
+    to = path if out is None else out
+    make_folder(to)
+    replace_file(to / SUMMARY, (json.dumps(data, indent=1) + "\n").encode())
     links = {
         row.key: f"{PAGES}/{row.key}/index.html"
         for row in rows
-        if (path / PAGES / row.key / "index.html").exists()
+        if (to / PAGES / row.key / "index.html").exists()
     }
     told = {
         "title": f"Experiments on the {meta['split']} split",
@@ -59,7 +62,7 @@ def present(path: Path) -> tuple[dict[str, Any], tuple[Table, ...]]:
         "findings": findings(data),
         "names": names,
     }
-    write_experiment(path, rows, data, made, told, links)
+    write_experiment(to, rows, data, made, told, links)
     return data, made
 
 

@@ -13,10 +13,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from forestall.errors import FileFormatError
 from forestall.reading.documents import parse_json
-from forestall.reading.files import read_text
+from forestall.reading.files import read_packed_text, read_text
 
 MOST_ROWS_BYTES = 2**30
 """How large the file of rows may be: about 200,000 episodes."""
+
+
+PACKED = ".xz"
+"""Ending of a file of rows that was packed when all of them were there."""
 
 
 class _Model(BaseModel):
@@ -85,13 +89,17 @@ class ExperimentCall(Call):
 def lines_of(file: Path) -> tuple[list[tuple[str, Any]], str, str]:
     """The lines of a file with one JSON value a line, each with its place.
 
+    Args:
+        file: as it is written; one that ends in .xz is packed and was finished before.
+
     Returns:
         (place, value) of every whole line; their text; half a last line, which a kill may leave.
 
     Raises:
         FileFormatError: the file cannot be read, or a whole line is no JSON.
     """
-    whole, newline, half = read_text(file, "list of results", MOST_ROWS_BYTES).rpartition("\n")
+    read = read_packed_text if file.suffix == PACKED else read_text
+    whole, newline, half = read(file, "list of results", MOST_ROWS_BYTES).rpartition("\n")
     found = []
     for number, line in enumerate((whole + newline).split("\n")[:-1], 1):
         place = f"{file}, line {number}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -53,6 +54,34 @@ def read_text(path: Path, what: str, most: int = MOST_BYTES, torn: str = "strict
     """
     try:
         return read_bytes(path, what, most).decode("utf-8-sig", torn)
+    except UnicodeDecodeError as error:
+        raise FileFormatError(
+            f"{path} is no {what}: it is not UTF-8 text (byte {error.start})"
+        ) from error
+
+
+def read_packed_text(path: Path, what: str, most: int = MOST_BYTES) -> str:
+    """The content of a UTF-8 text file that was packed with xz.
+
+    Args:
+        path: of the file.
+        what: it should be.
+        most: bytes that it may have, packed and unpacked.
+
+    Raises:
+        FileFormatError: as `read_text`, or it is damaged or no such file.
+    """
+    unpacker = lzma.LZMADecompressor(lzma.FORMAT_XZ)
+    try:
+        data = unpacker.decompress(read_bytes(path, what, most), max_length=most + 1)
+    except lzma.LZMAError as error:
+        raise FileFormatError(f"{path} is no {what} packed with xz: {error}") from error
+    if len(data) > most:
+        raise FileFormatError(f"{path} unpacks to more than the {_size(most)} of a {what}")
+    if not unpacker.eof:
+        raise FileFormatError(f"{path} is cut off: it is no whole {what}")
+    try:
+        return data.decode()
     except UnicodeDecodeError as error:
         raise FileFormatError(
             f"{path} is no {what}: it is not UTF-8 text (byte {error.start})"
