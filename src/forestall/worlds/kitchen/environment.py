@@ -31,6 +31,7 @@ from forestall.worlds.kitchen.catalogue import Catalogue, catalogue
 from forestall.worlds.kitchen.household import FLOOR, Household
 from forestall.worlds.kitchen.imperfection import ImperfectMotions, Rates
 from forestall.worlds.kitchen.law import Way, draw_law
+from forestall.worlds.kitchen.layout import Draw
 from forestall.worlds.kitchen.motions import Motions
 from forestall.worlds.kitchen.naming import (
     RefusalError,
@@ -104,6 +105,7 @@ class KitchenEnvironment:
         frames: what was drawn before; everything is drawn anew by default.
         rates: how often motions go wrong; never where it is None.
         ways: in which the household may differ from its catalogue; none by default.
+        draws: what draws a floor plan, by kind of room; the kitchen's own rooms by default.
     """
 
     def __init__(
@@ -120,6 +122,7 @@ class KitchenEnvironment:
         frames: FrameMemory | None = None,
         rates: Rates | None = None,
         ways: Sequence[Way] = (),
+        draws: Mapping[str, Draw] | None = None,
     ) -> None:
         self._needs = roomed(needs)
         self._catalogue = catalogue(domain)
@@ -130,7 +133,7 @@ class KitchenEnvironment:
         self._effect_config = effect_config or effects.EffectConfig()
         self._rates = rates
         self._ways = tuple(ways)
-        self._build = build or (_build_kitchen if rates is None else _build_honest)
+        self._build = build or _builder(rates is not None, draws)
         self._make = make or _maker(renderer, frames)
         self._seed: int | None = None
         self._released: tuple[str, Vec3] | None = None
@@ -369,17 +372,16 @@ def _wrapped(angle_rad: float) -> float:
     return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
-def _build_kitchen(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> Stage:
-    from forestall.worlds.kitchen.model import build_scene
+def _builder(honest: bool, draws: Mapping[str, Draw] | None) -> Build:
+    def build(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> Stage:
+        from forestall.worlds.kitchen.honest_world import HonestWorld
+        from forestall.worlds.kitchen.model import OWN, build_scene
+        from forestall.worlds.kitchen.world import KitchenWorld
 
-    return build_scene(needs, seed, catalogue)
+        make = HonestWorld if honest else KitchenWorld
+        return build_scene(needs, seed, catalogue, make, OWN if draws is None else draws)
 
-
-def _build_honest(needs: SceneNeeds, seed: int, catalogue: Catalogue) -> Stage:
-    from forestall.worlds.kitchen.honest_world import HonestWorld
-    from forestall.worlds.kitchen.model import build_scene
-
-    return build_scene(needs, seed, catalogue, HonestWorld)
+    return build
 
 
 def _maker(renderer: str, frames: FrameMemory | None) -> MakeRenderer:

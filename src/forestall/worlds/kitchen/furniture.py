@@ -15,6 +15,7 @@ from forestall.worlds.kitchen.forms import Form, Rect, Region, Stance, quaternio
 from forestall.worlds.kitchen.layout import (
     COUNTER_DEPTH_M,
     COUNTER_HEIGHT_M,
+    ROOM_HEIGHT_M,
     Item,
     columns_of,
 )
@@ -354,4 +355,12 @@ def corner(kit: Kit, item: Item, style: Style) -> Forms:
     _plate(part, Rect(-w / 2, 0, w / 2, w), _SLAB, COUNTER_HEIGHT_M, style)
     part.box((0, d / 2, _SLAB / 2), (w, d, _SLAB), style.front, texture=style.front_texture)
     part.box((0, 0.005, 1.12), (w, 0.01, 0.44), style.splash, texture="tiles")
+    return {}
+
+
+def block(kit: Kit, item: Item, style: Style) -> Forms:
+    """Scenery: a wall inside of the room."""
+    part = kit.furniture(None, item.name, (item.x, item.y, 0, item.yaw))
+    size = (item.width, item.depth, ROOM_HEIGHT_M)
+    part.box((0, item.depth / 2, ROOM_HEIGHT_M / 2), size, style.wall, texture="plaster")
     return {}

@@ -10,7 +10,7 @@ same frame.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,6 +20,9 @@ from forestall.worlds.kitchen.forms import Rect
 
 COUNTER_DEPTH_M = 0.62
 COUNTER_HEIGHT_M = 0.90
+ROOM_HEIGHT_M = 2.55
+"""Of kitchens."""
+
 STANDING_M = 0.95
 """Free floor in front of everything that the robot works at."""
 
@@ -103,6 +106,10 @@ class Plan:
     height: float
     items: tuple[Item, ...]
     decor: tuple[tuple[str, int, float, float, float, float], ...]
+
+
+Draw = Callable[[np.random.Generator, np.random.Generator], Plan]
+"""Draws a floor plan: from a stream for what is built in, and one for what stands free."""
 
 
 @dataclass(slots=True)

@@ -35,6 +35,9 @@ from forestall.worlds.kitchen.streams import Streams
 from forestall.worlds.kitchen.style import draw_light, draw_style
 from forestall.worlds.kitchen.world import HAND_M, KitchenWorld
 
+OWN: Mapping[str, layout.Draw] = {"kitchen": plans.kitchen, "living-room": plans.living_room}
+"""What draws the rooms that are this kitchen's own."""
+
 LAYOUTS = 10
 """How many layouts are tried for one seed."""
 
@@ -53,6 +56,7 @@ def build_scene(
     seed: int,
     catalogue: Catalogue,
     make: type[KitchenWorld] = KitchenWorld,
+    draws: Mapping[str, layout.Draw] = OWN,
 ) -> KitchenWorld:
     """Build the scene of a seed, the same each time.
 
@@ -61,6 +65,7 @@ def build_scene(
         seed: 0 or more.
         catalogue: categories, those of the task file included.
         make: what the geometry is.
+        draws: what draws a floor plan, by kind of room.
 
     Raises:
         SceneError: contradictory needs, or no room for something.
@@ -72,11 +77,14 @@ def build_scene(
     if base.room != needs.room:
         raise SceneError(f"a {base.room} cannot be changed into a {needs.room}")
     change = change_of(needs, base, lambda n, a: catalogue.default_states(n)[a])
+    if needs.room not in draws:
+        raise SceneError(f"there is no floor plan for a {needs.room}, only for {', '.join(draws)}")
     failure = ""
     for attempt in range(LAYOUTS):
         streams = Streams(seed, attempt, dict(needs.vary))
         contents = contents_of(needs, base, catalogue, streams)
-        empty = _empty_room(needs, base, contents.things, catalogue, streams, make)
+        drawn = _drawn(needs.room, draws[needs.room], streams)
+        empty = _empty_room(needs, base, contents.things, catalogue, streams, make, drawn)
         start = empty.world.bodies.snapshot()
         for stocking in range(STOCKINGS):
             empty.world.bodies.restore(start)
@@ -159,8 +167,9 @@ def _empty_room(
     catalogue: Catalogue,
     streams: Streams,
     make: type[KitchenWorld],
+    drawn: tuple[layout.Plan, Standing],
 ) -> _Empty:
-    plan, start = _drawn(needs.room, streams)
+    plan, start = drawn
     colours = streams("colours")
     kit = Kit(mujoco.MjSpec(), colours)
     forms = build_room(kit, plan, draw_style(colours), draw_light(streams("light")))
@@ -183,9 +192,8 @@ def _empty_room(
     return _Empty(world, fixtures, plan, floor)
 
 
-def _drawn(room: str, streams: Streams) -> tuple[layout.Plan, Standing]:
+def _drawn(room: str, draw: layout.Draw, streams: Streams) -> tuple[layout.Plan, Standing]:
     """A floor plan and the undisturbed start in it; other furniture stands in the same room."""
-    draw = plans.kitchen if room == "kitchen" else plans.living_room
     usual = streams.without("furniture").without("start")
     for draft in range(DRAFTS):
         try:

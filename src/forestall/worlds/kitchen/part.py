@@ -16,6 +16,7 @@ from forestall.types.scene import SceneNeeds
 from forestall.types.world import Working
 from forestall.worlds.kitchen.environment import KitchenEnvironment, KitchenOracle
 from forestall.worlds.kitchen.imperfection import Rates
+from forestall.worlds.kitchen.ithor import draws
 from forestall.worlds.kitchen.law import WAYS
 from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
 
@@ -52,6 +53,13 @@ class LawOption(Enum):
     DRAWN = "drawn"
 
 
+class Rooms(Enum):
+    """Which generator draws the rooms."""
+
+    OWN = "own"
+    ITHOR = "ithor"
+
+
 class Kitchens:
     """Implements `WorldPart`.
 
@@ -62,6 +70,7 @@ class Kitchens:
         law: whether the household differs from the domain file: "known" (never), "drawn", or as
             the profile has it.
         rates: how often skills go wrong, for the profile "honest".
+        rooms: "own" (drawn from the seed), or "ithor" (after seven rooms of AI2-THOR).
 
     Raises:
         UnknownNameError: no such renderer.
@@ -76,6 +85,7 @@ class Kitchens:
         profile: Profile = Profile.KIND,
         law: LawOption = LawOption.PROFILE,
         rates: Rates | None = None,
+        rooms: Rooms = Rooms.OWN,
     ) -> None:
         if renderer not in RENDERERS:
             raise UnknownNameError("renderer", renderer, RENDERERS)
@@ -86,6 +96,7 @@ class Kitchens:
         self._rates = (rates or Rates()) if honest else None
         drawn = honest if law is LawOption.PROFILE else law is LawOption.DRAWN
         self._ways = WAYS if drawn else ()
+        self._draws = draws() if rooms is Rooms.ITHOR else None
         self._frames = FrameMemory()
 
     @contextmanager
@@ -95,7 +106,13 @@ class Kitchens:
         """See the Protocol."""
         frames = self._frames if remember else None
         kitchen = KitchenEnvironment(
-            needs, domain, self._renderer, frames=frames, rates=self._rates, ways=self._ways
+            needs,
+            domain,
+            self._renderer,
+            frames=frames,
+            rates=self._rates,
+            ways=self._ways,
+            draws=self._draws,
         )
         try:
             yield OpenKitchen(kitchen)

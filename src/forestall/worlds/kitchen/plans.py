@@ -6,6 +6,7 @@ stream each, so that the furniture can be drawn anew in the same room.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from forestall.worlds.kitchen.forms import Rect
 from forestall.worlds.kitchen.layout import (
     COUNTER_DEPTH_M,
     COUNTER_HEIGHT_M,
+    ROOM_HEIGHT_M,
     Draft,
     Item,
     Plan,
@@ -23,12 +25,13 @@ from forestall.worlds.kitchen.layout import (
 )
 
 _CORNER, _FRIDGE, _FRIDGE_GAP, _STOVE = 0.64, 0.70, 0.25, 0.76
-_HANDLE = 0.11
-_APPLIANCES = {  # kind → free width to its left (towards -x) and right on the counter, own depth
+HANDLE_M = 0.11
+APPLIANCES = {  # kind → free width to its left (towards -x) and right on the counter, own depth
     "microwave": (0.28, 0.39, 0.06),
     "coffee_machine": (0.14, 0.14, 0.05),
     "toaster": (0.16, 0.16, 0.12),
 }
+_CABINET_M = (0.52, 0.62)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +70,14 @@ def kitchen(rng: np.random.Generator, places: np.random.Generator) -> Plan:
     table = draft.settle("table", draft.name("DiningTable"), size, free, gap=0.02)
     if table is None:
         raise SceneError("no room for the dining table")
-    _chairs(draft, table)
+    chairs(draft, table)
     every = [0, 1, 2, 3]
     shelf = draft.settle("shelf", draft.name("Shelf"), shelf_size, every)
     can = draft.settle("garbage_can", draft.name("GarbageCan"), bin_size, every, 0.75, gap=0.03)
     if shelf is None or can is None:
         raise SceneError("no room for the shelf and the garbage can")
-    _decorate(draft, free)
-    return Plan("kitchen", width, depth, 2.55, tuple(draft.items), tuple(draft.decor))
+    decorate(draft, free)
+    return Plan("kitchen", width, depth, ROOM_HEIGHT_M, tuple(draft.items), tuple(draft.decor))
 
 
 def _runs(shape: str, rng: np.random.Generator) -> tuple[float, float, list[_Run]]:
@@ -179,9 +182,9 @@ def _lay_run(draft: Draft, run: _Run) -> None:
             kinds = [m[0] for m in (("", 0.0), *run.modules, ("", 0.0))]
             beside = []  # room for the handles of pans on the stove
             if kinds[k] == "stove":
-                beside.append((-width / 2, -width / 2 + _HANDLE))
+                beside.append((-width / 2, -width / 2 + HANDLE_M))
             if kinds[k + 2] == "stove":
-                beside.append((width / 2 - _HANDLE, width / 2))
+                beside.append((width / 2 - HANDLE_M, width / 2))
             draft.add(
                 Item(
                     "counter",
@@ -203,13 +206,13 @@ def _set_appliances(draft: Draft) -> None:
     rng = draft.rng
     kinds = {"microwave": "Microwave", "coffee_machine": "CoffeeMachine", "toaster": "Toaster"}
     for kind, category in kinds.items():
-        left, right, inset = _APPLIANCES[kind]
+        left, right, inset = APPLIANCES[kind]
         need = left + right
         options = []
         for k, item in enumerate(draft.items):
             if item.kind != "counter":
                 continue
-            for x0, x1 in _stretches(item):
+            for x0, x1 in stretches(item):
                 if x1 - x0 >= need:
                     options.append((x1 - x0 - need, k, x0, x1))
         if not options:
@@ -229,16 +232,29 @@ def _set_appliances(draft: Draft) -> None:
 
 
 def _set_drawers(draft: Draft) -> None:
-    """Choose two columns of counters for real drawers that open without meeting each other."""
-    places = [
+    """Choose two columns of counters for real drawers."""
+    places = drawer_places(draft)
+    set_drawers(draft, [places[int(i)] for i in draft.rng.permutation(len(places))])
+
+
+def drawer_places(draft: Draft) -> list[tuple[int, int]]:
+    """Where a real drawer can be: (index of the counter, its column)."""
+    return [
         (k, c)
         for k, item in enumerate(draft.items)
         if item.kind == "counter"
         for c in drawer_columns(item.width, item.sink_x)
     ]
+
+
+def set_drawers(draft: Draft, places: Sequence[tuple[int, int]]) -> None:
+    """Make the first two places drawers that open without meeting each other.
+
+    Raises:
+        SceneError: there are no two.
+    """
     opened: list[Rect] = []
-    for index in draft.rng.permutation(len(places)):
-        k, column = places[int(index)]
+    for k, column in places:
         item = draft.items[k]
         x0, x1 = columns_of(item.width)[column]
         room = item.patch(Rect(x0, item.depth, x1, item.depth + 0.40))
@@ -252,7 +268,7 @@ def _set_drawers(draft: Draft) -> None:
     raise SceneError("no counters have room for two drawers")
 
 
-def _stretches(item: Item) -> list[tuple[float, float]]:
+def stretches(item: Item) -> list[tuple[float, float]]:
     """Free spans of a counter, ends kept clear."""
     taken = sorted(
         item.keep_out
@@ -277,28 +293,33 @@ def _hang_cabinets(draft: Draft) -> None:
         spans = [(low, high)]
         if item.sink_x is not None:
             spans = [(low, item.sink_x - 0.60), (item.sink_x + 0.60, high)]
-        options += [(item, a, b) for a, b in spans if b - a >= 0.52]
+        options += [(item, a, b) for a, b in spans if b - a >= _CABINET_M[0]]
     hung: list[Rect] = []
     for index in rng.permutation(len(options)):
         item, a, b = options[int(index)]
-        width = min(float(rng.uniform(0.52, 0.62)), b - a)
+        width = min(float(rng.uniform(*_CABINET_M)), b - a)
         x = float(rng.uniform(a + width / 2, b - width / 2)) if b - a > width else (a + b) / 2
-        px, py, _, yaw = item.local_pose(x, 0.011)
-        hinge = int(rng.choice([-1, 1]))
-        for side in (hinge, -hinge):
-            low, high = sorted((side * (width / 2 - 0.04), side * (width / 2 + 0.20)))
-            made = Item("cabinet", "", px, py, yaw, width, 0.33, z=1.38, hinge=side)
-            door = made.patch(Rect(low, 0.33, high, 0.36 + width))
-            if not any(r.overlaps(door) or r.overlaps(made.rect()) for r in hung):
-                draft.items.append(replace(made, name=draft.name("Cabinet")))
-                hung += [door, made.rect()]
-                break
+        hang_cabinet(draft, item, x, width, hung)
         if len(hung) == 4:
             return
     raise SceneError("no wall has room for two cabinets")
 
 
-def _chairs(draft: Draft, table: Item) -> None:
+def hang_cabinet(draft: Draft, item: Item, x: float, width: float, hung: list[Rect]) -> None:
+    """A wall cabinet above a counter, where it and its door meet none of those in `hung`."""
+    px, py, _, yaw = item.local_pose(x, 0.011)
+    hinge = int(draft.rng.choice([-1, 1]))
+    for side in (hinge, -hinge):
+        low, high = sorted((side * (width / 2 - 0.04), side * (width / 2 + 0.20)))
+        made = Item("cabinet", "", px, py, yaw, width, 0.33, z=1.38, hinge=side)
+        door = made.patch(Rect(low, 0.33, high, 0.36 + width))
+        if not any(r.overlaps(door) or r.overlaps(made.rect()) for r in hung):
+            draft.items.append(replace(made, name=draft.name("Cabinet")))
+            hung += [door, made.rect()]
+            return
+
+
+def chairs(draft: Draft, table: Item) -> None:
     size = (0.42, 0.42)
     for side in (-1, 1):
         if draft.rng.uniform() < 0.25:
@@ -311,7 +332,7 @@ def _chairs(draft: Draft, table: Item) -> None:
             draft.add(chair, 0.0)
 
 
-def _decorate(draft: Draft, walls: list[int]) -> None:
+def decorate(draft: Draft, walls: list[int]) -> None:
     """Pictures, a door, a clock on the walls that have no counters."""
     rng = draft.rng
     for k, wall in enumerate(walls):
@@ -365,13 +386,13 @@ def living_room(rng: np.random.Generator, places: np.random.Generator) -> Plan:
     table = draft.settle("table", draft.name("DiningTable"), size, sides, gap=0.02)
     if table is None:
         raise SceneError("no room for the dining table")
-    _chairs(draft, table)
+    chairs(draft, table)
     every = [0, 1, 2, 3]
     shelf = draft.settle("shelf", draft.name("Shelf"), shelf_size, every)
     lamp = draft.settle("floor_lamp", draft.name("FloorLamp"), (0.36, 0.36), every, 0.75, gap=0.03)
     if shelf is None or lamp is None:
         raise SceneError("no room for the shelf and the floor lamp")
     draft.decor.append(("rug", wall, u, float(draft.length(wall + 1) / 2), *rug))
-    _decorate(draft, sides)
+    decorate(draft, sides)
     draft.decor.append(("window", (wall + 2) % 4, -u, 1.15, 1.5, 0.95))
     return Plan("living-room", width, depth, 2.6, tuple(draft.items), tuple(draft.decor))

@@ -33,6 +33,8 @@ _BUILDERS: Mapping[str, Callable[[Kit, Item, Style], Forms]] = {
     "sofa": tables.sofa,
     "tv_stand": tables.tv_stand,
     "floor_lamp": tables.floor_lamp,
+    "coffee_table": tables.coffee_table,
+    "block": furniture.block,
 }
 
 

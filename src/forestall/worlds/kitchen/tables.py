@@ -82,6 +82,18 @@ def table(kit: Kit, item: Item, style: Style) -> Forms:
     return {item.name: Form(Rect(-w / 2, 0, w / 2, d), top, regions=(region,), stance=Stance(d))}
 
 
+def coffee_table(kit: Kit, item: Item, style: Style) -> Forms:
+    """Scenery: a low table."""
+    part = kit.furniture(None, item.name, (item.x, item.y, 0, item.yaw))
+    w, d, top = item.width, item.depth, 0.42
+    wood = darker(style.table, 0.9)
+    part.box((0, d / 2, top - 0.02), (w, d, 0.04), wood, texture="wood")
+    for x in (-w / 2 + 0.04, w / 2 - 0.04):
+        for y in (0.04, d - 0.04):
+            part.box((x, y, top / 2 - 0.02), (0.05, 0.05, top - 0.04), wood, texture="wood")
+    return {}
+
+
 def shelf(kit: Kit, item: Item, style: Style) -> Forms:
     """A low open rack; things stand on its top board."""
     part = kit.furniture(item.name, item.name, (item.x, item.y, 0, item.yaw))
