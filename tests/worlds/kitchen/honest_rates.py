@@ -34,6 +34,7 @@ from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.imperfection import AS_MEANT, DRAW_EVENT, PERFECT, Rates
 from forestall.worlds.kitchen.imperfection import WAYS as WAYS_OF
 from forestall.worlds.kitchen.law import LAW_EVENT, WAYS
+from forestall.worlds.kitchen.layout import Draw
 
 DOMAIN = shipped("household")
 
@@ -76,7 +77,9 @@ class Given:
         return {"states": "given"}
 
 
-def blank_kitchen(task: str, rates: Rates | None, drawn: bool) -> KitchenEnvironment:
+def blank_kitchen(
+    task: str, rates: Rates | None, drawn: bool, draws: Mapping[str, Draw] | None = None
+) -> KitchenEnvironment:
     """The real kitchen of a task, without pictures."""
     return KitchenEnvironment(
         load_task(task).task.scene,
@@ -85,6 +88,7 @@ def blank_kitchen(task: str, rates: Rates | None, drawn: bool) -> KitchenEnviron
         make=lambda _, intrinsics: Blank(intrinsics),
         rates=rates,
         ways=WAYS if drawn else (),
+        draws=draws,
     )
 
 

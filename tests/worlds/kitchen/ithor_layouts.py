@@ -52,6 +52,7 @@ LEGS: Mapping[str, tuple[Leg, ...]] = {
     "FloorPlan4": (
         ("counter", NORTH, -3.98, -3.62, None),
         ("counter", NORTH, -2.86, 0.00, None),
+        ("counter", WEST, 2.68, 3.49, None),
     ),
     "FloorPlan6": (
         ("counter", EAST, -0.28, 2.97, None),
@@ -75,7 +76,8 @@ LEGS: Mapping[str, tuple[Leg, ...]] = {
     "FloorPlan202": (),
 }
 """The sink of FloorPlan6 stands across its corner, and a leg of FloorPlan16 across the room: the
-first stands beside the corner here, the second is left out."""
+first stands beside the corner here, the second is left out. The end of FloorPlan4's high table that
+carries appliances is a counter."""
 
 STOVE_FACES = {
     "FloorPlan1": (NORTH, -0.255),
@@ -97,6 +99,9 @@ TABLE_FACES = {
     "FloorPlan16": SOUTH,
 }
 """From where the robot works at the dining table, or at the island that stands for one."""
+
+TABLE_ENDS = {"FloorPlan4": 2.64}
+"""Where a table ends that is partly a counter."""
 
 BLOCKS = {
     "FloorPlan2": ((-3.30, -1.80, -2.10, 1.75),),
@@ -236,6 +241,9 @@ def _standing(
     islands = [o for o in _all(objects, "CounterTop") if _island(o, objects)]
     for found in (tables or islands)[:1]:
         x, y, width, depth = _piece(found, TABLE_FACES[name])
+        if name in TABLE_ENDS:
+            low = y - width / 2
+            y, width = (low + TABLE_ENDS[name]) / 2, TABLE_ENDS[name] - low
         yield ["table", x, y, TABLE_FACES[name], width, depth]
         for seat in _all(objects, "Chair", "Stool"):
             yield ["chair", *_seat(seat, found, objects), 0.42, 0.42]

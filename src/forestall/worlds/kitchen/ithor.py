@@ -61,6 +61,7 @@ _HANGINGS = 20
 
 _SHIFTS = 40
 
+
 def draws(*names: str) -> Mapping[str, Draw]:
     """What draws each kind of room after the named layouts, or after all.
 
@@ -76,9 +77,7 @@ def draws(*names: str) -> Mapping[str, Draw]:
     return {room: partial(draw, [c for c in chosen if c.room == room]) for room in rooms}
 
 
-def draw(
-    choices: Sequence[Layout], rng: np.random.Generator, places: np.random.Generator
-) -> Plan:
+def draw(choices: Sequence[Layout], rng: np.random.Generator, places: np.random.Generator) -> Plan:
     """Draw a room after one of the layouts.
 
     Args:
@@ -112,7 +111,12 @@ def draw(
     free = [w for w in range(4) if w * math.pi / 2 not in taken]
     decorate(draft, [w for w in free if all(w != shown[0] for shown in chosen.windows)])
     return Plan(
-        chosen.room, chosen.width, chosen.depth, ROOM_HEIGHT_M, tuple(draft.items), tuple(draft.decor)
+        chosen.room,
+        chosen.width,
+        chosen.depth,
+        ROOM_HEIGHT_M,
+        tuple(draft.items),
+        tuple(draft.decor),
     )
 
 
@@ -167,7 +171,9 @@ def _fit_out(draft: Draft, chosen: Layout) -> None:
                 x, y, _, _ = item.local_pose(side * item.width / 2, item.depth / 2)
                 if any(s.distance(x, y) < 0.1 for s in stoves):
                     end = side * item.width / 2
-                    beside.append((min(end, end - side * HANDLE_M), max(end, end - side * HANDLE_M)))
+                    beside.append(
+                        (min(end, end - side * HANDLE_M), max(end, end - side * HANDLE_M))
+                    )
             draft.items[k] = replace(item, keep_out=tuple(beside))
     _set_sink(draft, chosen.spots["sink"][0])
     names = {"microwave": "Microwave", "coffee_machine": "CoffeeMachine", "toaster": "Toaster"}
