@@ -1,11 +1,11 @@
 """Converts dumps of AI2-THOR scenes into the kitchen's `ithor_layouts.toml`.
 
-    python tests/worlds/kitchen/ithor_layouts.py FOLDER src/forestall/worlds/kitchen/ithor_layouts.toml
+    python tests/worlds/kitchen/ithor_layouts.py FOLDER FILE
 
 FOLDER holds `FloorPlan*_physics.json`: object id → AI2-THOR's metadata of the object. Its frame has
-y up; x and z are the floor's x and y here. Positions, sizes and headings are those of the dump. What
-a dump does not say is written down below: counters stand in it as one bounding box around both legs
-of an L, walls inside of the room's rectangle do not stand in it at all.
+y up; x and z are the floor's x and y here. Positions, sizes and headings are those of the dump.
+What a dump does not say is written down below: counters stand in it as one bounding box around both
+legs of an L, walls inside of the room's rectangle do not stand in it at all.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ CORNER_M, STOVE_M, FRIDGE_M = 0.64, 0.76, 0.70
 SOURCE = """\
 # Where furniture stands in seven rooms of AI2-THOR (iTHOR), for `ithor.py`.
 # Made by tests/worlds/kitchen/ithor_layouts.py from the object metadata of the scenes
-# FloorPlan1, 2, 4, 6, 7, 16 and 202: AI2-THOR (Allen Institute for AI, Apache License 2.0), dumps of
-# the project rl_ai2thor (Copyright (c) 2024 Julian Paquerot, MIT License).
+# FloorPlan1, 2, 4, 6, 7, 16 and 202: AI2-THOR (Allen Institute for AI, Apache License 2.0), as
+# dumped by the project rl_ai2thor (Copyright (c) 2024 Julian Paquerot, MIT License; see
+# ithor_layouts.LICENSE).
 # Metres, rounded; x to the east, y to the north. A piece: kind, x and y of the middle of its back
 # edge, quarter turns to the left from facing north, width, depth.
 """
 
-# A leg of counters: what it is, where its front looks, from where to where along its wall, and where
-# its back is (None: at the wall). Read off from the doors and drawers under the worktop.
+# A leg of counters: what it is, where its front looks, from where to where along its wall, and
+# where its back is (None: at the wall). Read off from the doors and drawers under the worktop.
 Leg = tuple[str, int, float, float, float | None]
 LEGS: Mapping[str, tuple[Leg, ...]] = {
     "FloorPlan1": (

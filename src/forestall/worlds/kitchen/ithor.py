@@ -8,7 +8,7 @@ shifts what stands free; what a layout lacks is put along a wall.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -73,7 +73,7 @@ def draws(*names: str) -> Mapping[str, Draw]:
         if name not in known:
             raise UnknownNameError("layout", name, tuple(known))
     chosen = [known[n] for n in names or known]
-    rooms = {c.room for c in chosen}
+    rooms = dict.fromkeys(c.room for c in chosen)
     return {room: partial(draw, [c for c in chosen if c.room == room]) for room in rooms}
 
 
@@ -94,30 +94,20 @@ def draw(choices: Sequence[Layout], rng: np.random.Generator, places: np.random.
     for piece in chosen.pieces:
         if piece.kind in _BUILT_IN:
             _build_in(draft, piece)
-    if chosen.room == "kitchen":
+    kitchen = chosen.room == "kitchen"
+    if kitchen:
         _fit_out(draft, chosen)
     _hang_windows(draft, chosen)
-    for item in draft.items:
-        if item.kind == "fridge":
-            draft.items[draft.items.index(item)] = _hinged(draft, item)
     draft.rng = places
-    for kind, zone_m in (("table", 0.85), ("shelf", 0.85), ("garbage_can", 0.6)):
-        if chosen.room == "kitchen" or kind != "garbage_can":
-            _stand(draft, chosen, kind, zone_m)
-    if chosen.room == "living-room":
-        _stand(draft, chosen, "floor_lamp", 0.75)
+    _stand(draft, chosen, "table", 0.85)
+    _stand(draft, chosen, "shelf", 0.85)
+    _stand(draft, chosen, *(("garbage_can", 0.6) if kitchen else ("floor_lamp", 0.75)))
     _scenery(draft, chosen)
     taken = {i.yaw for i in draft.items if i.kind in _BUILT_IN}
     free = [w for w in range(4) if w * math.pi / 2 not in taken]
     decorate(draft, [w for w in free if all(w != shown[0] for shown in chosen.windows)])
-    return Plan(
-        chosen.room,
-        chosen.width,
-        chosen.depth,
-        ROOM_HEIGHT_M,
-        tuple(draft.items),
-        tuple(draft.decor),
-    )
+    items, decor = tuple(draft.items), tuple(draft.decor)
+    return Plan(chosen.room, chosen.width, chosen.depth, ROOM_HEIGHT_M, items, decor)
 
 
 def _build_in(draft: Draft, piece: Piece) -> None:
@@ -166,20 +156,28 @@ def _fit_out(draft: Draft, chosen: Layout) -> None:
     stoves = [i.rect() for i in draft.items if i.kind == "stove"]
     for k, item in enumerate(draft.items):
         if item.kind == "counter":
-            beside = []  # room for the handles of pans on the stove
-            for side in (-1, 1):
-                x, y, _, _ = item.local_pose(side * item.width / 2, item.depth / 2)
-                if any(s.distance(x, y) < 0.1 for s in stoves):
-                    end = side * item.width / 2
-                    beside.append(
-                        (min(end, end - side * HANDLE_M), max(end, end - side * HANDLE_M))
-                    )
-            draft.items[k] = replace(item, keep_out=tuple(beside))
+            draft.items[k] = replace(item, keep_out=tuple(_beside(item, stoves)))
+        elif item.kind == "fridge":
+            draft.items[k] = _hinged(draft, item)
     _set_sink(draft, chosen.spots["sink"][0])
     names = {"microwave": "Microwave", "coffee_machine": "CoffeeMachine", "toaster": "Toaster"}
     for kind, category in names.items():
         _set_appliance(draft, kind, category, chosen.spots[kind][0])
-    wanted = chosen.spots["drawers"]
+    _set_drawers(draft, chosen.spots["drawers"])
+    _hang_cabinets(draft, chosen.spots.get("cabinets", ()))
+
+
+def _beside(item: Item, stoves: Sequence[Rect]) -> Iterator[Spot]:
+    """The ends of a counter that stay free for the handles of pans on the stove."""
+    half = item.width / 2
+    for low, high, end in ((-half, HANDLE_M - half, -half), (half - HANDLE_M, half, half)):
+        x, y, _, _ = item.local_pose(end, item.depth / 2)
+        if any(s.distance(x, y) < 0.1 for s in stoves):
+            yield (low, high)
+
+
+def _set_drawers(draft: Draft, wanted: Sequence[Spot]) -> None:
+    """Two real drawers, near those of the layout."""
     places = drawer_places(draft)
     noise = draft.rng.uniform(0, 0.4, len(places))
 
@@ -190,7 +188,6 @@ def _fit_out(draft: Draft, chosen: Layout) -> None:
         return min(math.dist((x, y), w) for w in wanted) + float(noise[index])
 
     set_drawers(draft, [places[i] for i in sorted(range(len(places)), key=off)])
-    _hang_cabinets(draft, chosen.spots.get("cabinets", ()))
 
 
 def _set_sink(draft: Draft, at: Spot) -> None:
@@ -259,8 +256,8 @@ def _hang_cabinets(draft: Draft, wanted: Sequence[Spot]) -> None:
         draft.items, draft.counts["Cabinet"] = list(items), 0
         for item, a, b, x in places[k * len(wanted) // _HANGINGS :]:
             width = min(float(rng.uniform(*_CABINET_M)), b - a)
-            x = min(max(x, a + width / 2), b - width / 2)
-            hang_cabinet(draft, item, x, width, hung)
+            middle = min(max(x, a + width / 2), b - width / 2)
+            hang_cabinet(draft, item, middle, width, hung)
             if len(hung) == 4:
                 return
     raise SceneError("no wall has room for two cabinets")

@@ -70,7 +70,7 @@ def kitchen(rng: np.random.Generator, places: np.random.Generator) -> Plan:
     table = draft.settle("table", draft.name("DiningTable"), size, free, gap=0.02)
     if table is None:
         raise SceneError("no room for the dining table")
-    chairs(draft, table)
+    _chairs(draft, table)
     every = [0, 1, 2, 3]
     shelf = draft.settle("shelf", draft.name("Shelf"), shelf_size, every)
     can = draft.settle("garbage_can", draft.name("GarbageCan"), bin_size, every, 0.75, gap=0.03)
@@ -319,7 +319,7 @@ def hang_cabinet(draft: Draft, item: Item, x: float, width: float, hung: list[Re
             return
 
 
-def chairs(draft: Draft, table: Item) -> None:
+def _chairs(draft: Draft, table: Item) -> None:
     size = (0.42, 0.42)
     for side in (-1, 1):
         if draft.rng.uniform() < 0.25:
@@ -386,7 +386,7 @@ def living_room(rng: np.random.Generator, places: np.random.Generator) -> Plan:
     table = draft.settle("table", draft.name("DiningTable"), size, sides, gap=0.02)
     if table is None:
         raise SceneError("no room for the dining table")
-    chairs(draft, table)
+    _chairs(draft, table)
     every = [0, 1, 2, 3]
     shelf = draft.settle("shelf", draft.name("Shelf"), shelf_size, every)
     lamp = draft.settle("floor_lamp", draft.name("FloorLamp"), (0.36, 0.36), every, 0.75, gap=0.03)
