@@ -161,7 +161,7 @@ def _places(found: list[Mapping[str, Any]]) -> list[list[float]]:
 
 def _heading(found: Mapping[str, Any]) -> int:
     """Headings are clockwise in AI2-THOR."""
-    return round(-found["rotation"]["y"] / 90) % 4
+    return round(-float(found["rotation"]["y"]) / 90) % 4
 
 
 def _bounds(name: str, objects: list[Mapping[str, Any]]) -> list[float]:

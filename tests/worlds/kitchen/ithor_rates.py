@@ -48,7 +48,8 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=10000)
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.seeds)
-    rows, lost = [f"{'task':<16}" + "".join(f"{n:>13}" for n in layouts())], []
+    lost: list[str] = []
+    _say(f"{'task':<16}" + "".join(f"{n:>13}" for n in layouts()))
     for task in task_names():
         cells = []
         for layout in layouts().values():
@@ -58,8 +59,14 @@ def main() -> None:
             count, why = won(task, layout, seeds)
             cells.append(f"{count} of {given.seeds}")
             lost += why
-        rows.append(f"{task:<16}" + "".join(f"{c:>13}" for c in cells))
-    sys.stdout.write("\n".join([*rows, *lost]) + "\n")
+        _say(f"{task:<16}" + "".join(f"{c:>13}" for c in cells))
+    for line in lost:
+        _say(line)
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
 
 
 if __name__ == "__main__":

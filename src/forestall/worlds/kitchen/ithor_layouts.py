@@ -59,7 +59,10 @@ class Layout:
         return replace(
             self,
             pieces=tuple(replace(p, x=-p.x, facing=-p.facing % 4) for p in self.pieces),
-            windows=tuple((-w % 4, u if w % 2 else -u, *size) for w, u, *size in self.windows),
+            windows=tuple(
+                (-wall % 4, u if wall % 2 else -u, width, low, high)
+                for wall, u, width, low, high in self.windows
+            ),
             spots={k: tuple((-x, y) for x, y in v) for k, v in self.spots.items()},
         )
 
