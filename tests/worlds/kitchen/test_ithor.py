@@ -15,7 +15,7 @@ from ithor_rates import won
 from test_scene_build import DEVICES, FIXTURES, SALAD
 
 from forestall.assembly.configuration import Given
-from forestall.assembly.demonstrations import jobs_for, keyed
+from forestall.assembly.recording import jobs_for, keyed
 from forestall.errors import SceneError, UnknownNameError
 from forestall.worlds.kitchen import ithor
 from forestall.worlds.kitchen.catalogue import shipped_catalogue
