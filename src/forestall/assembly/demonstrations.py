@@ -34,7 +34,10 @@ from forestall.types.demonstration import Demonstration
 
 
 def load_memory(
-    config: RunConfig, workers: int | None = None, varied: int = 0
+    config: RunConfig,
+    workers: int | None = None,
+    varied: int = 0,
+    second: Given | None = None,
 ) -> tuple[list[Demonstration], str]:
     """Every demonstration that a run compares with, and where they come from.
 
@@ -42,19 +45,22 @@ def load_memory(
         config: of the run; its store says which memory, the ready-made one by default.
         workers: see `ready_made`.
         varied: see `ready_made`.
+        second: see `ready_made`.
 
     Raises:
         MemoryFileError: see `memory.store`.
     """
     given = memory_path(config)
-    path = given or str(ready_made(config, workers=workers, varied=varied))
+    path = given or str(ready_made(config, workers=workers, varied=varied, second=second))
     try:
         return _demonstrations(config, path), path
     except MemoryFileError:
         if given is not None:
             raise
     discard(Path(path))  # damaged deep inside, and can be made again
-    return _demonstrations(config, str(ready_made(config, workers=workers, varied=varied))), path
+    return _demonstrations(
+        config, str(ready_made(config, workers=workers, varied=varied, second=second))
+    ), path
 
 
 def _demonstrations(config: RunConfig, path: str) -> list[Demonstration]:
@@ -81,6 +87,7 @@ def ready_made(
     progress: Progress | None = None,
     workers: int | None = None,
     varied: int = 0,
+    second: Given | None = None,
 ) -> Path:
     """The path of a task's ready-made memory, made now if it is not in the cache.
 
@@ -96,9 +103,10 @@ def ready_made(
         workers: processes; all cores by default.
         varied: so many demonstrations, each another way to do the task; by default the nominal
             plan in `KITCHENS_PER_TASK` kitchens.
+        second: what is said besides of every second one, see `recording.jobs_for`.
     """
     name = config.load().task.name
-    path, jobs = _place(config, varied)
+    path, jobs = _place(config, varied, second)
     wanted = frozenset(keyed(jobs))
     if _complete(path, wanted):
         return path
@@ -119,21 +127,22 @@ def ready_made(
     return path
 
 
-def to_record(config: RunConfig, varied: int = 0) -> int:
+def to_record(config: RunConfig, varied: int = 0, second: Given | None = None) -> int:
     """How many demonstrations `ready_made` would have to record."""
-    path, jobs = _place(config, varied)
+    path, jobs = _place(config, varied, second)
     return 0 if _complete(path, frozenset(keyed(jobs))) else len(jobs)
 
 
-def _place(config: RunConfig, varied: int) -> tuple[Path, list[RecordingJob]]:
+def _place(config: RunConfig, varied: int, second: Given | None) -> tuple[Path, list[RecordingJob]]:
     """Where a ready-made memory lies, and what is recorded into it."""
     kitchens = varied or KITCHENS_PER_TASK
     ways = f"-{varied}-ways" if varied else ""
+    ways += "-in-two" if second is not None else ""
     name = f"{config.load().task.name}-{content_of(config)}{ways}.db"
     own = DOMAIN.name if config.domain is None else ""
     said = {c.kind: (c.name, dict(c.given)) for c in config.choices if c.kind != own}
     given = recorded_given(Given.of(said))
-    jobs = jobs_for([config.task], kitchens, given=given, varied=varied > 0)
+    jobs = jobs_for([config.task], kitchens, given=given, varied=varied > 0, second=second)
     return cache_dir() / "memory" / name, jobs
 
 

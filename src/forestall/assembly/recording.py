@@ -96,14 +96,26 @@ def jobs_for(
     given: Given | None = None,
     keep: Path | None = None,
     varied: bool = False,
+    second: Given | None = None,
 ) -> list[RecordingJob]:
-    """`kitchens` jobs for each task, each with seeds of its own; `varied`: as people do them."""
+    """`kitchens` jobs for each task, each with seeds of its own.
+
+    Args:
+        tasks: names or files.
+        kitchens: how many of each.
+        seed: the first one.
+        given: what was said about the parts.
+        keep: see `RecordingJob`.
+        varied: whether each is another way to do the task, as people do them.
+        second: what is said besides of every second one, such as rooms of another kind.
+    """
     said = given or Given()
+    other = said if second is None else second.over(said)
     return [
         RecordingJob(
             task,
             seed + k * (VARIED_TRIES if varied else TRIES),
-            said,
+            other if k % 2 else said,
             tries=VARIED_TRIES if varied and k else TRIES,
             keep=keep,
             variant=k if varied else 0,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from forestall.assembly.configuration import RunConfig, digest_of, run_config
+from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
 from forestall.assembly.demonstrations import memory_path, ready_made, to_record
 from forestall.assembly.make import needs_memory
 from forestall.domain.model import Domain
@@ -32,6 +32,7 @@ from forestall.experiments.worker import (
     config_of,
     prepared_run,
     run_one,
+    second_of,
     varied,
 )
 from forestall.memory.store import open_store
@@ -148,26 +149,32 @@ def check(experiment: Experiment, runs: Sequence[Run]) -> None:
 
 
 def _demonstrations(runs: Sequence[Run], experiment: Experiment, progress: Progress) -> None:
-    for config, ways in _memories(runs, experiment):
-        ready_made(config, progress=progress, workers=experiment.workers, varied=ways)
+    for config, ways, second in _memories(runs, experiment):
+        ready_made(
+            config, progress=progress, workers=experiment.workers, varied=ways, second=second
+        )
 
 
-def _memories(runs: Sequence[Run], experiment: Experiment) -> list[tuple[RunConfig, int]]:
-    """A run with each ready-made memory that runs need, and how many ways there are in it."""
+def _memories(
+    runs: Sequence[Run], experiment: Experiment
+) -> list[tuple[RunConfig, int, Given | None]]:
+    """A run with each ready-made memory that runs need, how many ways it has, and where."""
     wanted: dict[tuple[str, str, int], RunConfig] = {}
     for run in runs:
         key = (run.profile, run.case.task, varied(run))
         config = None if key in wanted else config_of(run, experiment.settings)
         if config is not None and needs_memory(config) and memory_path(config) is None:
             wanted[key] = config
-    return [(config, key[2]) for key, config in sorted(wanted.items(), key=lambda item: item[0])]
+    ordered = sorted(wanted.items(), key=lambda item: item[0])
+    return [(config, ways, second_of(profile)) for (profile, _, ways), config in ordered]
 
 
 def _cost(todo: Sequence[Run], experiment: Experiment) -> Cost:
     domain = experiment.settings.domain()
     steps = {task: len(load_task(task, domain).task.plan) for task in {r.case.task for r in todo}}
     recorded = sum(
-        to_record(config, ways) * steps[config.task] for config, ways in _memories(todo, experiment)
+        to_record(config, ways, second) * steps[config.task]
+        for config, ways, second in _memories(todo, experiment)
     )
     return cost_of([(r, steps[r.case.task]) for r in todo], recorded, experiment.workers)
 

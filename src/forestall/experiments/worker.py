@@ -98,6 +98,11 @@ def varied(run: Run) -> int:
     return 0 if run.demonstrations == PLAIN else int(run.demonstrations.split()[0])
 
 
+def second_of(profile: str) -> Given | None:
+    """What is said of every second demonstration of a household: other rooms than the robot's."""
+    return None if profile == KIND else Given.named({"world.rooms": "ithor"})
+
+
 def _household(profile: str, settings: Settings) -> Given:
     """What was said of the parts, in one profile of the household."""
     if profile == KIND:
@@ -307,8 +312,17 @@ def _memory(
     task: str, profile: str, ways: int, settings: Settings
 ) -> tuple[tuple[Demonstration, ...], str]:
     config = run_config(task, given=_household(profile, settings))
-    demonstrations, path = load_memory(config, workers=1, varied=ways)
+    demonstrations, path = load_memory(config, workers=1, varied=ways, second=second_of(profile))
     return tuple(demonstrations), path
 
 
-__all__ = ["PAGES", "Work", "broken_row", "config_of", "prepared_run", "run_one", "varied"]
+__all__ = [
+    "PAGES",
+    "Work",
+    "broken_row",
+    "config_of",
+    "prepared_run",
+    "run_one",
+    "second_of",
+    "varied",
+]
