@@ -6,10 +6,10 @@ Everything here errs on the side of too much.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from forestall.types.observation import Intrinsics
 from forestall.worlds.kitchen.rendering.drawn import Content
@@ -21,6 +21,8 @@ MARGIN_M = 0.003
 MARGIN_PIXELS = 2
 NEAREST_M = 0.02
 TILE = 16
+CALL_PIXELS = 4000.0
+"""How many pixels are drawn in the time that it takes to begin with a window."""
 
 Sphere = tuple[Float, float]
 Box = tuple[int, int, int, int]
@@ -28,7 +30,7 @@ Box = tuple[int, int, int, int]
 
 
 def on_screen(
-    corners_m: Float, camera_to_world: npt.NDArray[np.float64], camera: Intrinsics
+    corners_m: npt.NDArray[Any], camera_to_world: npt.NDArray[np.float64], camera: Intrinsics
 ) -> Box | None:
     """The pixels in which a box of eight corners (8, 3) can be seen, None for none."""
     local = (corners_m - camera_to_world[:3, 3]) @ camera_to_world[:3, :3]
@@ -92,45 +94,59 @@ def windows(dirty: Bool, pad: int) -> list[tuple[Box, Box]]:
     rows, columns = -(-height // TILE), -(-width // TILE)
     padded = np.zeros((rows * TILE, columns * TILE), dtype=bool)
     padded[:height, :width] = dirty
-    tiles = padded.reshape(rows, TILE, columns, TILE).any(axis=(1, 3))
-    labels, _ = ndimage.label(tiles, np.ones((3, 3)))
-    boxes = [
-        (y.start * TILE, x.start * TILE, min(y.stop * TILE, height), min(x.stop * TILE, width))
-        for y, x in ndimage.find_objects(labels)
-    ]
+    tiles = np.asarray(padded.reshape(rows, TILE, columns, TILE).any(axis=(1, 3)))
+    found = []
+    for one in _divided(tiles, 0, 0, pad):
+        top, left, bottom, right = (TILE * n for n in one)
+        box = top, left, min(bottom, height), min(right, width)
+        low, far = min(box[2] + pad, height), min(box[3] + pad, width)
+        found.append((box, (max(top - pad, 0), max(left - pad, 0), low, far)))
+    return found
 
-    def outer(box: Box) -> Box:
-        top, left, bottom, right = box
-        return (
-            max(top - pad, 0),
-            max(left - pad, 0),
-            min(bottom + pad, height),
-            min(right + pad, width),
-        )
 
-    merged = True
-    while merged:
-        merged = False
-        for i, one in enumerate(boxes):
-            for k in range(i + 1, len(boxes)):
-                both = _around(one, boxes[k])
-                if _area(outer(both)) <= _area(outer(one)) + _area(outer(boxes[k])):
-                    boxes[i] = both
-                    del boxes[k]
-                    merged = True
-                    break
-            if merged:
-                break
-    return [(box, outer(box)) for box in boxes]
+def _divided(tiles: Bool, top: int, left: int, pad: int) -> Iterator[Box]:
+    """Boxes of tiles around what is set, cut in two as long as that makes them cheaper."""
+    if not tiles.any():
+        return
+    down, across = np.flatnonzero(tiles.any(axis=1)), np.flatnonzero(tiles.any(axis=0))
+    tiles = tiles[down[0] : down[-1] + 1, across[0] : across[-1] + 1]
+    top, left = top + int(down[0]), left + int(across[0])
+    rows, columns = tiles.shape
+    least = float(_cost(np.array(rows), np.array(columns), pad))
+    cut = None
+    for axis, part in ((0, tiles), (1, tiles.T)):
+        if len(part) > 1:
+            before, after = _costs(part, pad)[:-1], _costs(part[::-1], pad)[::-1][1:]
+            k = int((before + after).argmin())
+            if before[k] + after[k] < least:
+                least, cut = float(before[k] + after[k]), (axis, k + 1)
+    if cut is None:
+        yield top, left, top + rows, left + columns
+    elif cut[0] == 0:
+        yield from _divided(tiles[: cut[1]], top, left, pad)
+        yield from _divided(tiles[cut[1] :], top + cut[1], left, pad)
+    else:
+        yield from _divided(tiles[:, : cut[1]], top, left, pad)
+        yield from _divided(tiles[:, cut[1] :], top, left + cut[1], pad)
+
+
+def _costs(tiles: Bool, pad: int) -> npt.NDArray[np.float64]:
+    """For each k the cost of the box around what is set in the first k + 1 rows; the first is."""
+    held = np.logical_or.accumulate(tiles, axis=0)
+    width = tiles.shape[1] - held[:, ::-1].argmax(axis=1) - held.argmax(axis=1)
+    last = np.maximum.accumulate(np.where(tiles.any(axis=1), np.arange(len(tiles)), 0))
+    return _cost(last + 1, width, pad)
+
+
+def _cost(
+    rows: npt.NDArray[np.int64], columns: npt.NDArray[np.int64], pad: int
+) -> npt.NDArray[np.float64]:
+    return (TILE * rows + 2.0 * pad) * (TILE * columns + 2.0 * pad) + CALL_PIXELS
 
 
 def area(boxes: Iterable[tuple[Box, Box]]) -> int:
     """Pixels of the outer boxes."""
     return sum(_area(outer) for _, outer in boxes)
-
-
-def _around(a: Box, b: Box) -> Box:
-    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
 
 
 def _area(box: Box) -> int:

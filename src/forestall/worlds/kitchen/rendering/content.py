@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from forestall.worlds.kitchen.rendering.appearance import TEXTURES, Appearance
 from forestall.worlds.kitchen.rendering.drawn import Content
-from forestall.worlds.kitchen.rendering.shading import CLEAR_BELOW, TEXTURE_PLACES, Surfaces
+from forestall.worlds.kitchen.rendering.shading import CLEAR_BELOW, Surfaces
 from forestall.worlds.kitchen.rendering.tessellate import tessellate
 from forestall.worlds.kitchen.rendering.tracer import Float, drawn
 
@@ -27,7 +27,7 @@ class ContentReader:
         self._appearance = appearance
         self._surfaces = Surfaces(model, appearance)
         kind = [-1 if t is None else TEXTURES.index(t) for t in appearance.texture]
-        place = np.where(np.array(kind) < 0, 0, np.arange(model.ngeom) % TEXTURE_PLACES)
+        place = np.where(np.array(kind) < 0, 0, self._surfaces.place)
         self._texture = np.stack([np.array(kind), place], axis=1).astype(np.float64)
         self._meshes = [_mesh(model, i) for i in range(model.nmesh)]
         self._boxes: dict[bytes, Float] = {}
@@ -57,7 +57,7 @@ class ContentReader:
             return self._last[1]
         look, form = [b""] * model.ngeom, [b""] * model.ngeom
         corners = np.zeros((model.ngeom, 8, 3), np.float32)
-        for g in np.flatnonzero(visible):
+        for g in np.flatnonzero(visible).tolist():
             figure = shape[g].tobytes() + self._mesh_of(g)
             form[g] = _digest(figure + pose[g].tobytes())
             look[g] = _digest(form[g] + paint[g].tobytes())
@@ -137,7 +137,8 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> bytes:
     first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     face, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     vertices, triangles = model.mesh_vert[first : first + count], model.mesh_face
-    return _digest(vertices.tobytes() + triangles[face : face + faces].tobytes())
+    figure: bytes = vertices.tobytes() + triangles[face : face + faces].tobytes()
+    return _digest(figure)
 
 
 def _digest(data: bytes) -> bytes:

@@ -6,6 +6,7 @@ Made by `picture`, kept by `memory`, read by `redrawing`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +71,7 @@ class Drawn:
     def nbytes(self) -> int:
         """Of the arrays that belong to this frame alone."""
         frame, basis = self.frame, self.basis
-        arrays = [frame.rgb, frame.depth_m, frame.instance_ids]
+        arrays: list[npt.NDArray[Any] | None] = [frame.rgb, frame.depth_m, frame.instance_ids]
         if basis is not None:
             arrays += [basis.geom, basis.normal, basis.reach, basis.smoothed]
             arrays += [basis.own_at, basis.own_points]

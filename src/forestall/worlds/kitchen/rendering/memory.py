@@ -1,4 +1,4 @@
-"""The memory of drawn frames; imports no simulator. `remembered` and `redrawing` key and fill it."""
+"""The memory of drawn frames; imports no simulator. `remembered` and `redrawing` fill it."""
 
 from __future__ import annotations
 

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -36,6 +35,7 @@ from forestall.worlds.kitchen.rendering.pixels import contrasts, discontinuities
 from forestall.worlds.kitchen.rendering.shading import CLEAR_BELOW, Surfaces, shade, to_display
 from forestall.worlds.kitchen.rendering.tracer import Bool, Float, Hits, Int, Tracer
 from forestall.worlds.kitchen.rendering.vectors import rows, turned
+from forestall.worlds.kitchen.rendering.window import Patch, Shot, View, Window
 
 BAND_ROWS = 48
 CHUNK = 16384
@@ -45,76 +45,14 @@ OWN_GROUP_STEP = 2
 INFLUENCE = 8
 """How many pixels away what is hit at one pixel may change the colour of another.
 
-The filter over the light grid reaches 4 pixels, its interpolation 2, and whether a pixel is smoothed
-depends on the colours of its neighbours.
+The filter over the light grid reaches 4 pixels, its interpolation 2, and whether a pixel is
+smoothed depends on the colours of its neighbours.
 """
 
 LAYERS = 3
 """How many transparent surfaces a ray passes at most."""
 
 _SUBPIXELS = ((-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125))
-
-
-@dataclass(frozen=True, slots=True)
-class Window:
-    """A part of the picture; `top` and `left` are even, the other ends are excluded."""
-
-    top: int
-    left: int
-    bottom: int
-    right: int
-
-    @property
-    def pixels(self) -> tuple[slice, slice]:
-        """The part of an array of pixels."""
-        return np.s_[self.top : self.bottom, self.left : self.right]
-
-    @property
-    def grid(self) -> tuple[slice, slice]:
-        """The part of the light grid."""
-        rows, columns = -(-self.bottom // STRIDE), -(-self.right // STRIDE)
-        return np.s_[self.top // STRIDE : rows, self.left // STRIDE : columns]
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.bottom - self.top, self.right - self.left
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shot:
-    """Where the camera is, and the lights."""
-
-    origin: Float
-    rotation: Float
-    lights: Lights
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """A shot, and the light that was measured in a window of it.
-
-    `grid_*` are rows of the window's light grid (every STRIDE-th pixel of every STRIDE-th row);
-    `own` collects the flat pixels and the places of points that cast light rays of their own.
-    """
-
-    shot: Shot
-    window: Window
-    grid_size: tuple[int, int]
-    grid_points: Float
-    grid_normals: Float
-    grid_reach: Float
-    own: list[tuple[Int, Float]] = field(default_factory=list)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Patch:
-    """What a window shows."""
-
-    window: Window
-    rgb: npt.NDArray[np.uint8]
-    depth_m: Float
-    basis: Basis
 
 
 class RayRenderer:
@@ -245,7 +183,7 @@ class RayRenderer:
         return Patch(window, rgb, depth, basis)
 
     def _primary(self, shot: Shot, window: Window) -> tuple[Hits, Float, Float]:
-        height, width = window.size
+        width = window.size[1]
         camera = self._intrinsics
         rays = self._rays.reshape(camera.height, camera.width, 3)[window.pixels].reshape(-1, 3)
         count = len(rays)
@@ -393,9 +331,7 @@ class RayRenderer:
         layers: int = LAYERS,
     ) -> Float:
         """Colours, with what lies behind transparent surfaces shining through."""
-        colour = shade(
-            self._surfaces, shot.lights, hits, points, directions, reach, self._pixel_m
-        )
+        colour = shade(self._surfaces, shot.lights, hits, points, directions, reach, self._pixel_m)
         alpha = rows(self._surfaces.alpha, hits.geom)
         clear = np.flatnonzero((alpha < CLEAR_BELOW) & (hits.geom >= 0))
         if clear.size and layers:

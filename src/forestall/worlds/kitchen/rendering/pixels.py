@@ -1,4 +1,4 @@
-"""What neighbours on the image plane have to do with each other; called by `picture` and `redrawing`."""
+"""What neighbours in the picture have to do with each other; called by its makers."""
 
 from __future__ import annotations
 

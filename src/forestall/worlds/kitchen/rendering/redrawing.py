@@ -44,9 +44,10 @@ from forestall.worlds.kitchen.rendering.lighting import (
     block_group,
 )
 from forestall.worlds.kitchen.rendering.memory import FrameMemory
-from forestall.worlds.kitchen.rendering.picture import INFLUENCE, RayRenderer, Shot, Window
+from forestall.worlds.kitchen.rendering.picture import INFLUENCE, RayRenderer
 from forestall.worlds.kitchen.rendering.pixels import grown
 from forestall.worlds.kitchen.rendering.tracer import Bool, Float, Int
+from forestall.worlds.kitchen.rendering.window import Shot, Window
 
 LOOKED_AT = 12
 """Of the frames from one place, how many are compared with a scene."""
