@@ -87,7 +87,7 @@ class ContentReader:
     def _mesh_of(self, geom: int) -> bytes:
         if self._model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
             return b""
-        return self._meshes[self._model.geom_dataid[geom]]
+        return self._meshes[int(self._model.geom_dataid[geom])]
 
     def _box(self, figure: bytes, geom: int) -> npt.NDArray[Any]:
         """(8, 3) corners in the geom's own frame."""
