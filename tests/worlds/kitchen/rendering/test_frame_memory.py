@@ -9,6 +9,7 @@ from forestall.types.observation import Frame, Intrinsics, Observation
 from forestall.types.plan import Subtask
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.rendering import FrameMemory
+from forestall.worlds.kitchen.rendering.drawn import Drawn
 
 SMALL = Intrinsics.from_vertical_fov(96, 72, 60.0)
 
@@ -64,9 +65,9 @@ def test_what_was_not_asked_for_the_longest_time_is_forgotten() -> None:
 
     size = 72 * 96 * 7
     memory = FrameMemory(most_bytes=2 * size)
-    memory.keep(b"a", frame(1))
-    memory.keep(b"b", frame(2))
+    memory.keep(b"a", Drawn(frame(1)))
+    memory.keep(b"b", Drawn(frame(2)))
     assert memory.get(b"a") is not None
-    memory.keep(b"c", frame(3))
+    memory.keep(b"c", Drawn(frame(3)))
     assert memory.get(b"b") is None
     assert memory.get(b"a") is not None and memory.get(b"c") is not None

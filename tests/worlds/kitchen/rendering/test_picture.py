@@ -13,7 +13,8 @@ from room import CAMERA, FORWARD, KINDS, Room, mixed_room, wall
 from forestall.errors import InputError, UnknownNameError
 from forestall.worlds.kitchen.rendering import TEXTURES, Appearance, make_renderer
 from forestall.worlds.kitchen.rendering.embree import EmbreeTracer
-from forestall.worlds.kitchen.rendering.picture import RayRenderer, discontinuities
+from forestall.worlds.kitchen.rendering.picture import RayRenderer
+from forestall.worlds.kitchen.rendering.pixels import discontinuities
 from forestall.worlds.kitchen.rendering.textures import texture
 from forestall.worlds.kitchen.rendering.timing import frame_times
 

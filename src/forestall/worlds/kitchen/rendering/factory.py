@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from forestall.worlds.kitchen.rendering.memory import FrameMemory
+    from forestall.worlds.kitchen.rendering.picture import RayRenderer
 
 RENDERERS = ("auto", "embree", "gl", "rays")
 
@@ -30,6 +31,17 @@ def make_remembering(
     frames: FrameMemory,
 ) -> Renderer:
     """As `make_renderer`, for one that draws nothing twice."""
+    if name == "embree" or (name == "auto" and _embree_imports()):
+        from forestall.worlds.kitchen.rendering.redrawing import RedrawingRenderer
+
+        return RedrawingRenderer(
+            frames,
+            lambda: _make_embree(model, appearance, intrinsics, threads=1),
+            name,
+            model,
+            appearance,
+            intrinsics,
+        )
     from forestall.worlds.kitchen.rendering.remembered import RememberingRenderer
 
     return RememberingRenderer(
@@ -64,19 +76,29 @@ def make_renderer(
         from forestall.worlds.kitchen.rendering.gl import GlRenderer
 
         return GlRenderer(model, appearance, intrinsics)
-    from forestall.worlds.kitchen.rendering.picture import RayRenderer
-
     if name == "rays" or (name == "auto" and not _embree_imports()):
+        from forestall.worlds.kitchen.rendering.picture import RayRenderer
         from forestall.worlds.kitchen.rendering.rays import MujocoTracer
 
         return RayRenderer(MujocoTracer(model), model, appearance, intrinsics)
+    return _make_embree(model, appearance, intrinsics)
+
+
+def _make_embree(
+    model: mujoco.MjModel,
+    appearance: Appearance,
+    intrinsics: Intrinsics,
+    threads: int | None = None,
+) -> RayRenderer:
+    from forestall.worlds.kitchen.rendering.picture import RayRenderer
+
     try:
         from forestall.worlds.kitchen.rendering.embree import EmbreeTracer
     except ImportError as error:
         raise InputError(
             f"embreex cannot be imported ({error}): pip install embreex, or use the renderer 'rays'"
         ) from error
-    return RayRenderer(EmbreeTracer(model), model, appearance, intrinsics)
+    return RayRenderer(EmbreeTracer(model), model, appearance, intrinsics, threads)
 
 
 def _embree_imports() -> bool:

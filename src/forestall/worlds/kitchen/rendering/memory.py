@@ -1,44 +1,58 @@
-"""The memory of drawn frames; imports no simulator. `remembered` keys and fills it."""
+"""The memory of drawn frames; imports no simulator. `remembered` and `redrawing` fill it."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterator
 
-from forestall.types.observation import Frame
+from forestall.worlds.kitchen.rendering.drawn import Drawn
 
 
 class FrameMemory:
     """The frames drawn last, up to a number of bytes; one for each process.
 
     Args:
-        most_bytes: of pictures, depths and ids together.
+        most_bytes: of pictures, depths, ids and what they were made from together.
     """
 
     def __init__(self, most_bytes: int = 600_000_000) -> None:
         self._most = most_bytes
         self._bytes = 0
-        self._frames: OrderedDict[bytes, Frame] = OrderedDict()
+        self._frames: OrderedDict[bytes, tuple[Drawn, bytes]] = OrderedDict()
+        self._places: dict[bytes, list[bytes]] = {}
         self.hits = 0
         self.misses = 0
 
-    def get(self, key: bytes) -> Frame | None:
+    def get(self, key: bytes) -> Drawn | None:
         """The frame of a key, None when it is not remembered."""
-        frame = self._frames.get(key)
-        if frame is None:
+        found = self._frames.get(key)
+        if found is None:
             self.misses += 1
             return None
         self.hits += 1
         self._frames.move_to_end(key)
-        return frame
+        return found[0]
 
-    def keep(self, key: bytes, frame: Frame) -> None:
-        """Remember a frame, forgetting those that were not asked for the longest time."""
-        self._frames[key] = frame
-        self._bytes += _size(frame)
+    def near(self, place: bytes) -> Iterator[Drawn]:
+        """The frames of the same place, the latest first."""
+        return (self._frames[key][0] for key in reversed(self._places.get(place, ())))
+
+    def keep(self, key: bytes, drawn: Drawn, place: bytes = b"") -> None:
+        """Remember a frame, forgetting those that were not asked for the longest time.
+
+        Args:
+            key: of all that the frame shows.
+            drawn: the frame.
+            place: of the camera and the lights alone.
+        """
+        self._frames[key] = drawn, place
+        if place:
+            self._places.setdefault(place, []).append(key)
+        self._bytes += drawn.nbytes
         while self._bytes > self._most and len(self._frames) > 1:
-            self._bytes -= _size(self._frames.popitem(last=False)[1])
-
-
-def _size(frame: Frame) -> int:
-    ids = 0 if frame.instance_ids is None else frame.instance_ids.nbytes
-    return frame.rgb.nbytes + frame.depth_m.nbytes + ids
+            old, (forgotten, there) = self._frames.popitem(last=False)
+            self._bytes -= forgotten.nbytes
+            if there:
+                self._places[there].remove(old)
+                if not self._places[there]:
+                    del self._places[there]

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from forestall.seams import Renderer
 from forestall.types.observation import Frame, Intrinsics
 from forestall.worlds.kitchen.rendering.appearance import Appearance
+from forestall.worlds.kitchen.rendering.drawn import Drawn
 from forestall.worlds.kitchen.rendering.memory import FrameMemory
 
 
@@ -47,15 +48,16 @@ class RememberingRenderer:
     def render(self, data: Any, camera_to_world: npt.NDArray[np.float64]) -> Frame:
         """See `interfaces.Renderer.render`; the arrays of a remembered frame are read-only."""
         key = self._key(data, camera_to_world)
-        frame = self._memory.get(key)
-        if frame is None:
-            if self._inner is None:
-                self._inner = self._make()
-            frame = self._inner.render(data, camera_to_world)
-            for array in (frame.rgb, frame.depth_m, frame.instance_ids):
-                if array is not None:
-                    array.flags.writeable = False
-            self._memory.keep(key, frame)
+        found = self._memory.get(key)
+        if found is not None:
+            return found.frame
+        if self._inner is None:
+            self._inner = self._make()
+        frame = self._inner.render(data, camera_to_world)
+        for array in (frame.rgb, frame.depth_m, frame.instance_ids):
+            if array is not None:
+                array.flags.writeable = False
+        self._memory.keep(key, Drawn(frame))
         return frame
 
     def _key(self, data: Any, camera_to_world: npt.NDArray[np.float64]) -> bytes:

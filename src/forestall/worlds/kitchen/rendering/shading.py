@@ -29,11 +29,14 @@ _BACKGROUND = (0.55, 0.62, 0.70)
 _GLOW = 2.2
 _LEAST_AMBIENT = np.float32(0.2)
 """Share of the ambient that reaches even the tightest corner."""
+TEXTURE_PLACES = 64
+"""After how many geoms textures begin at the same place again."""
+CLEAR_BELOW = 0.98
+"""Opacity from which on nothing shines through."""
 _GAMMA_STEPS = 1 << 14
 _TINTS = np.array([*(TINTS[name] for name in TEXTURES), (1.0, 1.0, 1.0)], np.float32)
-_SHIFT_M = np.stack([0.113 * np.arange(64), 0.071 * (37 * np.arange(64) % 64)], 1).astype(
-    np.float32
-)
+_STEPS = np.arange(TEXTURE_PLACES)
+_SHIFT_M = np.stack([0.113 * _STEPS, 0.071 * (37 * _STEPS % TEXTURE_PLACES)], 1).astype(np.float32)
 """Where a geom's texture begins, so that neighbours do not show the same piece."""
 
 
@@ -48,6 +51,7 @@ class Surfaces:
         self.kind = np.array(
             [-1 if t is None else TEXTURES.index(t) for t in appearance.texture], dtype=np.int32
         )
+        self.place = texture_places(model, appearance)
         shine = [_SHINE.get(t, _SHINE[None]) for t in appearance.texture]
         self.shine: Float = np.array(shine, dtype=np.float32).reshape(-1, 3)
         self.metal: Float = (self.kind == TEXTURES.index("metal")).astype(np.float32)
@@ -77,6 +81,17 @@ class Surfaces:
         self.rotation = np.asarray(data.geom_xmat, np.float32).reshape(-1, 3, 3)
         half = np.asarray(model.geom_aabb[:, 3:])
         self.axes = np.argsort(-half, axis=1, kind="stable").astype(np.int32)
+
+
+def texture_places(model: mujoco.MjModel, appearance: Appearance) -> Int:
+    """(ngeom,) where each geom's texture begins.
+
+    What is no instance (the robot) comes after all that there is: counted within its own body, it
+    looks the same however many things there are.
+    """
+    own = np.arange(model.ngeom) - np.asarray(model.body_geomadr)[model.geom_bodyid]
+    index = np.where(appearance.geom_instance < 0, own, np.arange(model.ngeom))
+    return np.asarray(index % TEXTURE_PLACES, dtype=np.int32)
 
 
 def shade(
@@ -141,7 +156,7 @@ def _arriving(light: Light, points: Float, normal: Float) -> tuple[Float, Float]
     if linear or square or c != 1.0:
         strength = strength / np.maximum(c + distance * (linear + square * distance), 1e-3)
     if light.cone_cosine > -1:
-        along = -(towards @ light.direction)
+        along = -dot(towards, light.direction)
         strength = strength * np.clip((along - light.cone_cosine + 0.1) / 0.25, 0, 1)
     return towards, strength.astype(np.float32)
 
@@ -184,7 +199,7 @@ def _texture_factor(surfaces: Surfaces, hits: Hits, points: Float, pixel_m: floa
         local = rotated_back(rotation, rows(points, textured) - rows(surfaces.position, geom))
         across = np.abs(rotated_back(rotation, rows(hits.normal, textured)))
         uv = face_coordinates(local, across, rows(surfaces.axes, geom))
-        uv += rows(_SHIFT_M, geom % len(_SHIFT_M))
+        uv += rows(_SHIFT_M, rows(surfaces.place, geom))
         footprint = rows(hits.distance, textured) * np.float32(pixel_m)
         kind_here = rows(kinds, textured)
         for kind in np.unique(kind_here):

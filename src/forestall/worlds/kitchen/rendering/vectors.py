@@ -41,3 +41,17 @@ def rotated_back(rotation: Float, vectors: Float) -> Float:
         out[:, j] += flat[:, 3 + j] * vectors[:, 1]
         out[:, j] += flat[:, 6 + j] * vectors[:, 2]
     return out
+
+
+def turned(rotation: Float, vectors: Float) -> Float:
+    """Vectors (n, 3) rotated by one matrix (3, 3).
+
+    A matrix product would do the same up to the last bit, which there depends on the machine and on
+    what else stands in the array.
+    """
+    out = np.empty(vectors.shape, np.float32)
+    for i in range(3):
+        out[:, i] = vectors[:, 0] * rotation[i, 0]
+        out[:, i] += vectors[:, 1] * rotation[i, 1]
+        out[:, i] += vectors[:, 2] * rotation[i, 2]
+    return out
