@@ -10,6 +10,7 @@ from forestall.comparison.preconditions import MiningConfig
 from forestall.detection.preconditions import PreconditionConfig, PreconditionDetector
 from forestall.domain.load import shipped
 from forestall.errors import InputError
+from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Calibration, Decision, Reference
@@ -63,6 +64,19 @@ def test_one_decisive_fact_is_an_alarm(observed: SceneGraph, named: str) -> None
     assert verdict.decision is Decision.REPLAN
     assert verdict.score == pytest.approx(1 - 5 / 6)
     assert named in verdict.note and "4 of 4" in verdict.note
+    assert verdict.lacking == (Literal.parse(named),)
+
+
+def test_only_what_is_behind_the_alarm_lacks() -> None:
+    detector = PreconditionDetector(BENCH)
+    both = detector.judge(scene(IN_THE_HOLE, dirty="dirty"), None, FOUR)
+    assert {str(x) for x in both.lacking} == {"free(RoundHole-1)", "dirt(RoundHole-1)=clean"}
+    for fine in (scene(), scene(dirty=None)):
+        assert detector.judge(fine, None, FOUR).lacking == ()
+    seldom = references(scene(), scene(dirty=None), scene(dirty=None), scene(dirty=None))
+    careful = PreconditionDetector(BENCH, MiningConfig(1), PreconditionConfig(threshold=0.2))
+    one = careful.judge(scene(IN_THE_HOLE, dirty="dirty"), None, seldom)
+    assert [str(x) for x in one.lacking] == ["free(RoundHole-1)"]
 
 
 def test_what_was_not_seen_calls_for_another_look() -> None:

@@ -15,7 +15,7 @@ from forestall.comparison.relevance import counts
 from forestall.detection.scene_graph import NO_REFERENCE
 from forestall.domain.model import Domain
 from forestall.errors import InputError
-from forestall.types.facts import Truth
+from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
@@ -107,7 +107,10 @@ class PreconditionDetector:
         false = [v for v in found if v.truth is Truth.FALSE]
         score = 1.0 - max((weight(v) for v in false), default=0.0)
         if score < self._config.threshold:
-            return self._verdict(Decision.REPLAN, score, references, _listed("violated", false))
+            asked = [v for v in false if 1.0 - weight(v) < self._config.threshold]
+            lacking = tuple(dict.fromkeys(v.literal for v in asked))
+            note = _listed("violated", false)
+            return self._verdict(Decision.REPLAN, score, references, note, lacking)
         unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
         strange = self._strange(observed, subtask)
         if unseen or strange:
@@ -142,6 +145,7 @@ class PreconditionDetector:
         score: float | None,
         references: Sequence[Reference],
         note: str = "",
+        lacking: tuple[Literal, ...] = (),
     ) -> Verdict:
         config = self._config
         return Verdict(
@@ -153,6 +157,7 @@ class PreconditionDetector:
             nearest=references[0] if references else None,
             references=demonstrations_of(references),
             note=note,
+            lacking=lacking,
         )
 
 
