@@ -24,11 +24,14 @@ from forestall.report.page import write_page
 from forestall.seams import WorldPart
 from forestall.statistics.metrics import WATCH
 from forestall.statistics.rows import EXACT, KIND, PLAIN, EpisodeRow, Judged
+from forestall.tasks.causes import causes
 from forestall.tasks.faults import knowable
+from forestall.tasks.losses import losses
 from forestall.tasks.truth import TruthTrace
 from forestall.types.decision import Outcome
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import (
+    SLIP,
     BoundaryRecord,
     EpisodeEnd,
     EpisodeRecord,
@@ -193,8 +196,10 @@ def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace)
         judged.append(_judged(boundary, record, moment.possible, moment.reachable))
     trouble = record.trouble
     broke = trouble is not None and trouble.kind in _BROKEN
+    lost = {} if broke or run.strategy != WATCH else _lost(run, prepared, record, trace)
     return EpisodeRow(
-        **_identity(run, prepared),
+        **(_identity(run, prepared) | lost),
+        slips=sum(e.kind == SLIP for e in record.events),
         success=bool(record.success),
         weak_success=record.weak_success,
         failures=record.failures,
@@ -229,10 +234,30 @@ def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace)
     )
 
 
+def _lost(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace) -> dict[str, Any]:
+    """When the run that nobody interrupts was lost, and why, as the truth has it.
+
+    When it can be known that a failing scenario fails is said by the scenario; in the honest
+    household any run can fail, and the truth says when.
+    """
+    scenario, failing = prepared.scenario, run.case.failing
+    faults = prepared.faults if failing else ()
+    said = scenario.moments(prepared.plan) if failing and scenario else (None, None)
+    loss = losses(trace, record, faults, said)
+    if loss is None:
+        return {} if run.profile == KIND else {"known": None, "effect": None}
+    facts = causes(trace, faults, prepared.loaded.domain, loss.at)
+    found: dict[str, Any] = {"causes": tuple(map(str, facts))}
+    if run.profile != KIND:
+        found |= {"known": loss.known, "effect": loss.effect}
+    return found
+
+
 def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
     scenario = prepared.scenario
     moments = (None, None) if scenario is None else scenario.moments(prepared.plan)
     failing = run.case.failing
+    told = failing and run.profile == KIND
     return {
         "set": run.case.set,
         "task": run.case.task,
@@ -247,8 +272,8 @@ def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
         "profile": run.profile,
         "model": run.model,
         "demonstrations": run.demonstrations,
-        "known": moments[0] if failing else None,
-        "effect": moments[1] if failing else None,
+        "known": moments[0] if told else None,
+        "effect": moments[1] if told else None,
     }
 
 

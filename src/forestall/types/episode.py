@@ -33,6 +33,10 @@ class SkillOutcome:
     hand_world_m: Vec3 | None = None  # where the hand let go of something
 
 
+SLIP = "slip"
+"""Kind of the event that a motion of the robot did not come out as it was meant."""
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """One thing that happened in the world (oracle side): time, kind, objects, words."""

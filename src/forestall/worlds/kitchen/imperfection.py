@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import InputError, SceneError
+from forestall.types.episode import SLIP
 from forestall.types.facts import category_of
 from forestall.worlds.kitchen import effects
 from forestall.worlds.kitchen.household import FLOOR, Household
@@ -191,6 +192,8 @@ class ImperfectMotions(Motions):
         if way in cannot:
             told, way = f"{told}{way} is not possible, ", ""
         robot.household.record(DRAW_EVENT, things[:1], told + (way or AS_MEANT))
+        if way:
+            robot.household.record(SLIP, things[:1], f"{said}: {way}")
         return way
 
     def _fail(self, robot: Robot, seconds: float, why: str) -> NoReturn:
