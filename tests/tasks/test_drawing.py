@@ -188,7 +188,7 @@ def test_what_reaches_the_goal_is_not_harmless_for_that_alone() -> None:
     left = Played(True, left=frozenset({"heat_left_on"}))
     assert label([left]) is Label.LEAVES
     assert label([left], usual=left.left) is Label.SUCCEEDS
-    tables = {
+    tables: dict[str, dict[str, object]] = {
         "make-coffee": {"kind": "drop_step", "step": "toggle_off(Faucet)"},
         "heat-potato": {"kind": "drop_step", "step": "put_on(Plate, CounterTop)"},
         "warm-water": {"kind": "drop_step", "step": "pick_up(Mug)", "occurrence": 2},

@@ -30,7 +30,7 @@ def superfluous(graph: SceneGraph, step: Subtask, domain: Domain) -> bool:
         return False
     skill = domain.skill(step.skill)
     names = {p.name: a for p, a in zip(skill.parameters, args, strict=True)}
-    chosen = [c.variable for c in skill.choices]
+    chosen = [c.variable.name for c in skill.choices]
     wanted = [
         fact.bind(names)
         for effect in skill.effects
