@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from forestall.tasks.aftermath import superfluous
 from forestall.tasks.composing import Candidate
 from forestall.tasks.drawing import Drawer, moments
-from forestall.tasks.faults import apply_plan_faults, check_steps, parse_fault
+from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, parse_fault
 from forestall.tasks.files import Scenario, load_task, task_names
 from forestall.tasks.judging import Label, Played, fixtures_in, label, play
 from forestall.tasks.midrun_candidates import MidrunComposer
@@ -20,6 +22,7 @@ from forestall.tasks.scene_faults import MoveObject, SetState
 from forestall.tasks.schemas import ScenarioSetFile
 from forestall.tasks.writing import set_file
 from forestall.testing.part import SymbolicWorlds
+from forestall.testing.symbolic_scene import start_scene
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan
 
@@ -178,3 +181,65 @@ def test_what_is_written_reads_as_what_was_drawn() -> None:
             assert [getattr(s, field) for s in read.scenarios] == [
                 getattr(s, field) for s in scenarios
             ]
+
+
+def test_what_reaches_the_goal_is_not_harmless_for_that_alone() -> None:
+    assert label([Played(True, stumbled=True), Played(True)]) is Label.STUMBLES
+    left = Played(True, left=frozenset({"heat_left_on"}))
+    assert label([left]) is Label.LEAVES
+    assert label([left], usual=left.left) is Label.SUCCEEDS
+    tables: dict[str, dict[str, object]] = {
+        "make-coffee": {"kind": "drop_step", "step": "toggle_off(Faucet)"},
+        "heat-potato": {"kind": "drop_step", "step": "put_on(Plate, CounterTop)"},
+        "warm-water": {"kind": "drop_step", "step": "pick_up(Mug)", "occurrence": 2},
+    }
+    found = {}
+    for task, table in tables.items():
+        scenario = Scenario("x", task, "", "", "", (parse_fault(table),))
+        found[task] = play(WORLD, load_task(task), scenario, 1)
+        assert found[task].success
+    assert found["make-coffee"].left == {"water_left_running"}
+    assert found["heat-potato"].refused and not found["heat-potato"].stumbled
+    assert found["warm-water"].refused and found["warm-water"].stumbled
+
+
+@pytest.mark.parametrize(
+    ("step", "expected"),
+    [
+        ("put_on(Potato, Plate)", False),
+        ("put_on(Plate, Potato)", False),
+        ("put_on(Potato, CounterTop-1)", True),
+        ("toggle_off(Sink)", False),
+        ("pick_up(Potato)", False),
+        ("pick_up(Ladle)", False),
+        ("close_obj(Microwave)", True),
+    ],
+)
+def test_a_step_is_superfluous_where_all_that_it_brings_about_is_so(
+    step: str, expected: bool
+) -> None:
+    loaded = load_task("heat-potato")
+    scene = replace(loaded.task.scene, clutter=(0, 0))
+    needs = apply_scene_faults(scene, (MoveObject(object="Potato-1", places=("CounterTop-1",)),),
+                               loaded.domain)  # fmt: skip
+    graph = start_scene(loaded.domain, needs, 1)
+    assert superfluous(graph, Plan.parse([step]).subtasks[0], loaded.domain) is expected
+
+
+def test_a_helper_does_nothing_that_the_plan_has_still_to_prepare() -> None:
+    loaded = load_task("heat-potato")
+    plan = loaded.task.plan
+    shut = [str(s) for s in plan].index("close_obj(Microwave)")
+    for seed in range(10):
+        composer = MidrunComposer(loaded, np.random.default_rng(seed), ())
+        for candidate in composer.midrun(plan):
+            if candidate.kind == "helped" and "toggle_on(Microwave)" in candidate.title:
+                assert candidate.since > shut
+
+
+def test_things_are_called_as_people_count_them() -> None:
+    loaded = load_task("toast-bread")
+    scene = SceneComposer(loaded, np.random.default_rng(0), ())
+    assert scene.a("Bread") == "a loaf of bread" and scene.a("BreadSliced") == "a bread slice"
+    titles = {c.title for c in scene.scene()}
+    assert {"A second loaf of bread", "No bread", "A second knife"} <= titles

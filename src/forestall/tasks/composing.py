@@ -148,9 +148,15 @@ class Composed:
             return name
         return f"the {self.words(name)}"
 
+    def one(self, name: str) -> str:
+        """How a person counts a thing: loaves of bread, heads of lettuce."""
+        words = self.words(name)
+        counted = [s for s in self.domain[name].synonyms if s.endswith(f" of {words}")]
+        return counted[0] if counted else words
+
     def a(self, name: str) -> str:
         """A thing of a category in a sentence."""
-        words = self.words(name)
+        words = self.one(name)
         return f"{'an' if words[0].lower() in 'aeiou' else 'a'} {words}"
 
     def at(self, place: str) -> str:

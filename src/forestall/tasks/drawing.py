@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from zlib import crc32
 
 import numpy as np
 
 from forestall.seams import WorldPart
-from forestall.tasks.composing import Candidate, begun, counted, named
+from forestall.tasks.composing import Candidate, counted, named
 from forestall.tasks.faults import ReplacePlan, apply_plan_faults
 from forestall.tasks.files import END, LoadedTask, Scenario
 from forestall.tasks.judging import Label, Played, fixtures_in, label, play
@@ -46,6 +46,11 @@ ONE_MORE_ROOM = 30_000
 
 SLIPS = ("failed-action", "dropped")
 KIND_ONES = ("helped", "moved")
+UNKIND_ONES = ("put-away", "in-the-hand")
+"""What nobody does to a robot at work, even where the goal is reached all the same."""
+
+IN_THE_WAY = {"others-there": "occupied"}
+"""What a kind is called where its start fails: other things there take the room."""
 
 Rooms = Callable[[int], Sequence[int]]
 """Seeds of the rooms that the k-th start of a task in a set has."""
@@ -93,7 +98,8 @@ class Drawer:
         self.fill("double", self._pairs(), Label.FAILS, SIZES["double"])
         self.plans("planner", SIZES["planner"])
         again = [c for _ in range(3) for c in self._midrun() if c.kind in KIND_ONES]
-        pool = [*scene, *(c for c in midrun if c.kind not in SLIPS), *again, *self._ways()]
+        kind_ones = [c for c in midrun if c.kind not in (*SLIPS, *UNKIND_ONES)]
+        pool = [*scene, *kind_ones, *again, *self._ways()]
         pool = [c for c in pool if c.kind not in self._accidents()]
         self.fill("everyday", pool, Label.SUCCEEDS, SIZES["everyday"])
         return self.drawn
@@ -118,7 +124,7 @@ class Drawer:
             placed.append(scenario)
             taken[kind] += 1
             if wanted is Label.FAILS:
-                self._failing.append(candidate)
+                self._failing.append(replace(candidate, kind=scenario.kind))
 
     def plans(self, of: str, count: int, tries: int = 80) -> None:
         """Erroneous plans as they come, so that their kinds keep their rates."""
@@ -155,7 +161,10 @@ class Drawer:
             candidate.faults,
             of,
         )
+        plain = self._undisturbed(self.rooms(number)[0])
+        usual = plain.left
         plays: list[Played] = []
+        so_far = Label.SUCCEEDS
         for seed in (*self.rooms(number), ONE_MORE_ROOM + number % 10):
             looking = not plays
             plays.append(
@@ -169,25 +178,29 @@ class Drawer:
                     candidate.since,
                 )
             )
-            so_far = label(plays)
+            so_far = label(plays, usual)
             if so_far not in (Label.SUCCEEDS, Label.FAILS) or wanted not in (None, so_far):
                 return so_far, scenario
         known = effect = None
-        if label(plays) is Label.FAILS:
+        kind = candidate.kind
+        if so_far is Label.FAILS:
             known, effect = moments(self._plan_of(candidate), plays)
-        first = self.rooms(number)[0]
-        if first not in self._plain:
-            self._plain[first] = play(self.world, self.loaded, None, first, looking=True)
-        compared = plays[0].seen != self._plain[first].seen
+            kind = IN_THE_WAY.get(kind, kind)
+        compared = plays[0].seen != plain.seen
         told = Scenario(
-            *(name, candidate.task, candidate.title, candidate.kind, candidate.cause),
+            *(name, candidate.task, candidate.title, kind, candidate.cause),
             candidate.faults,
             of,
             known=known,
             effect=effect,
             compared=compared,
         )
-        return label(plays), told
+        return so_far, told
+
+    def _undisturbed(self, seed: int) -> Played:
+        if seed not in self._plain:
+            self._plain[seed] = play(self.world, self.loaded, None, seed, looking=True)
+        return self._plain[seed]
 
     def _accidents(self) -> set[str]:
         """Kinds of states that nothing in the domain brings about: nobody means them to be."""
@@ -213,7 +226,7 @@ class Drawer:
             yield Candidate(
                 one.task,
                 f"{one.kind}+{other.kind}",
-                f"{one.title}; {other.title}"[:90],
+                f"{one.title}; {other.title}",
                 f"{one.cause} {other.cause}",
                 (*one.faults, *other.faults),
                 one.since,
@@ -258,9 +271,9 @@ def _as_candidate(task: str, sort: str, way: Variation, loaded: LoadedTask) -> C
     added = [o for o in way.scene.objects if o.id not in own]
     faults = [AddObject(category=o.category, places=o.places) for o in added]
     plan = ReplacePlan(plan=tuple(way.plan.texts()))
-    title = begun(f"{words}")
+    title = f"Another valid plan: {words}"
     cause = f"The robot's plan is another valid one: {words}."
-    return Candidate(task, f"plan-{sort}", title[:70], cause, (*faults, plan))
+    return Candidate(task, f"plan-{sort}", title, cause, (*faults, plan))
 
 
 def _text(plan: Plan, at: int) -> str:

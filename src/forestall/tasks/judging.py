@@ -17,6 +17,7 @@ from forestall.errors import ForestallError
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.seams import OracleView, WorldPart
+from forestall.tasks.aftermath import left, superfluous
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.eyes import SharedEyes
 from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, wrap
@@ -37,6 +38,8 @@ class Label(StrEnum):
     FAILS = "fails"
     SUCCEEDS = "succeeds"
     SPOILS = "succeeds and spoils something else"
+    STUMBLES = "succeeds although a step that was needed is refused"
+    LEAVES = "succeeds and leaves something as the domain's safety rules forbid"
     LOST = "is lost before anybody could do anything"
     MIXED = "differs from room to room"
     IMPOSSIBLE = "cannot be built"
@@ -57,6 +60,8 @@ class Played:
         lost: whether the harm was there from the start.
         history: what has happened that cannot be undone, whether or not the goal is about it.
         problem: why the start could not be built; then nothing else is told.
+        stumbled: whether a refused step had something left to do.
+        left: names of the safety rules that are broken at the end and were not at the start.
     """
 
     success: bool
@@ -68,6 +73,8 @@ class Played:
     lost: bool = False
     history: frozenset[Literal] = frozenset()
     problem: str = ""
+    stumbled: bool = False
+    left: frozenset[str] = frozenset()
 
 
 def play(
@@ -99,7 +106,8 @@ def play(
         with world.open(needs, domain) as opened:
             env = wrap(opened.environment, faults, opened.disturbance, domain)
             env.reset(seed)
-            refused, seen = [], []
+            before = left(opened.oracle.truth(), domain)
+            refused, seen, stumbled = [], [], False
             told = [len(opened.oracle.events())]
             visible = None if watch else since
             for at, step in enumerate(plan):
@@ -115,9 +123,11 @@ def play(
                 told.append(len(opened.oracle.events()))
                 if outcome.status is SkillStatus.REFUSED:
                     refused.append((at, outcome.reason))
+                    stumbled |= not superfluous(opened.oracle.truth(), step, domain)
             success, _, failures = TruthGoalChecker(domain).check(task.goal, opened.oracle)
             harmed = _first_harm(loaded, opened.oracle, told)
             history = opened.oracle.history()
+            after = left(opened.oracle.truth(), domain)
     except ForestallError as error:
         return Played(False, problem=str(error))
     idle = env.idle if isinstance(env, FaultyEnvironment | SharedEyes) else 0
@@ -133,18 +143,29 @@ def play(
         harmed == -1,
         history,
         problem,
+        stumbled,
+        after - before,
     )
 
 
-def label(plays: Sequence[Played]) -> Label:
-    """What several rooms say together."""
+def label(plays: Sequence[Played], usual: frozenset[str] = frozenset()) -> Label:
+    """What several rooms say together.
+
+    Args:
+        plays: of one start.
+        usual: the safety rules that the task itself breaks (a burner that is to be on).
+    """
     if any(p.problem for p in plays):
         return Label.IMPOSSIBLE
     outcomes = {p.success for p in plays}
     if len(outcomes) != 1:
         return Label.MIXED
     if outcomes == {True}:
-        return Label.SPOILS if any(p.history for p in plays) else Label.SUCCEEDS
+        if any(p.history for p in plays):
+            return Label.SPOILS
+        if any(p.stumbled for p in plays):
+            return Label.STUMBLES
+        return Label.LEAVES if any(p.left - usual for p in plays) else Label.SUCCEEDS
     done = any(p.lost or (p.harmed is not None and p.harmed < p.visible) for p in plays)
     return Label.LOST if done else Label.FAILS
 

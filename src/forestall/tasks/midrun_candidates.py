@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from forestall.tasks.composing import Candidate, Composed, counted, named
 from forestall.tasks.faults import Drop, FailedAction, Fault, Meanwhile
 from forestall.tasks.scene_faults import AddObject
-from forestall.types.plan import Plan
+from forestall.types.plan import Plan, Subtask
 
 
 class MidrunComposer(Composed):
@@ -24,7 +24,9 @@ class MidrunComposer(Composed):
 
     def _meanwhile_states(self) -> Iterator[tuple[str, str, tuple[Fault, ...], Meanwhile]]:
         for name, attribute, value in self.changes():
-            told = f"somebody makes {self.the(name)} {self.domain.say(attribute, value)}"
+            if attribute in self.domain.lasting:
+                continue
+            told = f"somebody leaves {self.the(name)} {self.domain.say(attribute, value)}"
             change = Meanwhile(object=name, attribute=attribute, value=value)
             yield f"state-{attribute}", told, (), change
 
@@ -58,25 +60,35 @@ class MidrunComposer(Composed):
                 yield "occupied" if limited else "others-there", told, (there,), put
 
     def _helps(self, plan: Plan) -> Iterator[Candidate]:
-        """Somebody does the work of a later step: changes its state, or puts its thing there."""
+        """Somebody does the work of a later step: changes its state, or puts its thing there.
+
+        A state is changed only after what the plan does to the same thing before (nobody starts a
+        machine whose door the plan has still to shut).
+        """
         for later, step in enumerate(plan):
             skill = self.domain.skill(step.skill)
             made = [
                 f for e in skill.effects for f in e.facts if f.predicate in self.domain.attributes
             ]
             thing = self.meant(step.args[0])
-            change = None
+            change, first = None, 0
             if skill.undoes is not None and len(step.args) == 1 and made:
                 change = Meanwhile(object=thing, attribute=made[0].predicate, value=made[0].value)
                 told = f"somebody does {step}, which the plan does later"
+                handled = [k for k in range(later) if self._works(plan.subtasks[k], step.args[0])]
+                first = max(handled, default=0)
             elif (
                 skill.hand is not None and len(step.args) == 2 and self.domain.offers(step.args[1])
             ):
                 change = Meanwhile(object=thing, place=self.meant(step.args[1]))
                 told = f"somebody puts {self.the(thing)} {self.to(step.args[1])}, as the plan would"
-            if change is not None and later > 1 and self.domain.find(thing) is not None:
-                before = int(self.rng.integers(later - 1))
+            if change is not None and first < later - 1 and self.domain.find(thing) is not None:
+                before = int(self.rng.integers(first, later - 1))
                 yield from self._at_steps(plan, "helped", told, (), change, before)
+
+    def _works(self, step: Subtask, name: str) -> bool:
+        """Whether a step changes the state of a thing and nothing else."""
+        return step.args == (name,) and self.domain.skill(step.skill).undoes is not None
 
     def _at_steps(
         self,
@@ -93,7 +105,7 @@ class MidrunComposer(Composed):
         yield Candidate(
             self.task.name,
             kind,
-            f"Meanwhile {told}"[:70],
+            f"Meanwhile {told}",
             f"While the robot works, after {named(step, number)}, {told}.",
             (*more, then),
             since=at + 1,

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from forestall.tasks.composing import Candidate, begun, counted
+from forestall.tasks.composing import Candidate, begun, counted, named
 from forestall.tasks.faults import (
     DropStep,
     Fault,
@@ -92,13 +92,13 @@ class ErringPlanner:
             return None
         title = begun(words)
         since = divergence(self.plan, erring)
-        return Candidate(self.task.name, kind, title[:70], f"{title}.", faults, since)
+        return Candidate(self.task.name, kind, title, f"{title}.", faults, since)
 
     def _missing_step(self) -> Error:
         at = self._one(self.acts)
         step, number = counted(self.plan, at)
         fault = DropStep(step=str(step), occurrence=number)
-        return (fault,), f"the plan leaves out {step}"
+        return (fault,), f"the plan leaves out {named(step, number)}"
 
     def _missing_errand(self) -> Error | None:
         """What prepares something is left out altogether: two to four steps in a row."""
@@ -108,8 +108,8 @@ class ErringPlanner:
         first = self._one(self.acts[: -length + 1])
         gone = list(range(first, min(first + length, len(self.plan))))
         kept = [s for k, s in enumerate(self.plan) if k not in gone]
-        named = f"{self.plan.subtasks[first]} to {self.plan.subtasks[gone[-1]]}"
-        return (_whole(kept),), f"the plan leaves out {named}"
+        ends = [named(*counted(self.plan, k)) for k in (gone[0], gone[-1])]
+        return (_whole(kept),), f"the plan leaves out {' to '.join(ends)}"
 
     def _other_order(self) -> Error | None:
         """A step comes one to three acts too early or too late."""
@@ -126,7 +126,8 @@ class ErringPlanner:
             return None
         way = {"after" if shift > 0 else "before": str(anchor)}
         fault = MoveStep(step=str(step), occurrence=number, **way)
-        words = f"the plan does {step} {'only after' if shift > 0 else 'before'} {anchor}"
+        when = "only after" if shift > 0 else "before"
+        words = f"the plan does {named(step, number)} {when} {anchor}"
         return (fault,), words
 
     def _additional_step(self) -> Error:
@@ -147,7 +148,8 @@ class ErringPlanner:
         later = self._one([k for k in range(len(self.plan)) if k >= at])
         anchor, number = counted(self.plan, later)
         fault = InsertStep(step=str(more), after=str(anchor), occurrence=number)
-        return (fault,), f"the plan does {more} once more, after {anchor}"
+        how = "once more" if more in self.plan.subtasks[: later + 1] else "too"
+        return (fault,), f"the plan does {more} {how}, after {named(anchor, number)}"
 
     def _other_object(self, there: bool) -> Error | None:
         """Another thing in the place of one of the task's, all through or in one step.
@@ -181,8 +183,8 @@ class ErringPlanner:
             return None
         at = self._one(puts)
         step, number = counted(self.plan, at)
-        named = {category_of(a) for s in self.plan for a in s.args}
-        places = sorted((named | self.room) - {category_of(step.args[-1])})
+        spoken = {category_of(a) for s in self.plan for a in s.args}
+        places = sorted((spoken | self.room) - {category_of(step.args[-1])})
         places = [p for p in places if domain.accepts(p, step.args[0])]
         if not places:
             return None
@@ -190,7 +192,7 @@ class ErringPlanner:
         role = domain.skill(step.skill).roles[-1]
         fault = ReplaceArgument(step=str(step), occurrence=number, argument=role, by=other)
         instead = Subtask(step.skill, (*step.args[:-1], other))
-        return (fault,), f"the plan has {instead} for {step}"
+        return (fault,), f"the plan has {instead} for {named(step, number)}"
 
     def _affordance(self) -> Error | None:
         """A step is done to something that it cannot be done to."""
@@ -204,7 +206,7 @@ class ErringPlanner:
         role = self.domain.skill(step.skill).roles[-1]
         fault = ReplaceArgument(step=str(step), occurrence=number, argument=role, by=other)
         instead = Subtask(step.skill, (*step.args[:-1], other))
-        return (fault,), f"the plan has {instead} for {step}"
+        return (fault,), f"the plan has {instead} for {named(step, number)}"
 
     def _alike(self, one: str, other: str) -> int:
         """How many tags and attributes two categories share."""

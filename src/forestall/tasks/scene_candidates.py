@@ -116,7 +116,7 @@ class SceneComposer(Composed):
                     self.task.name,
                     "in-front",
                     begun(front),
-                    begun(f"{self.a(other)} stands in front of {self.the(need.id)}."),
+                    begun(f"{self.a(other)} is in front of {self.the(need.id)}."),
                     (AddObject(category=other, in_front_of=need.id),),
                     watch=("thing", f"{other}-1"),
                 )
@@ -132,11 +132,12 @@ class SceneComposer(Composed):
             ]:
                 states = {attribute: value} if attribute else {}
                 like = f", {domain.say(attribute, value)}" if attribute else ""
+                first = "the first is as usual" if attribute else "the robot may take either"
                 yield Candidate(
                     self.task.name,
                     "second-other" if attribute else "second",
-                    f"A second {self.words(need.id)}{like}",
-                    f"There is a second {self.words(need.id)}{like}; the robot may take either.",
+                    f"A second {self.one(need.id)}{like}",
+                    f"There is a second {self.one(need.id)}{like}; {first}.",
                     (AddObject(category=need.category, places=places, states=states),),
                     watch=("thing", f"{need.category}-2"),
                 )
@@ -150,8 +151,8 @@ class SceneComposer(Composed):
                 yield Candidate(
                     self.task.name,
                     "beside",
-                    begun(f"{says}, beside"),
-                    begun(f"{says}, stands about; the task does not need it."),
+                    begun(f"{says}, elsewhere"),
+                    begun(f"{says}, is somewhere in the room; the task does not need it."),
                     (AddObject(category=other, states={attribute: value}),),
                     watch=("thing", f"{other}-1"),
                 )

@@ -173,7 +173,7 @@ class _Varying:
             rest = [p for k, p in enumerate(parts) if k != source]
             rest.insert(target, moved)
             way = "earlier" if target < source else "later"
-            words = f"{moved[-1]} {way}" if len(moved) < 4 else f"what ends in {moved[-1]} {way}"
+            words = f"{moved[-1]} {way}" if len(moved) < 4 else f"{moved[0]} to {moved[-1]} {way}"
             yield tuple(s for p in rest for s in p), self.scene, words
 
     def _errands(self) -> list[Steps]:
