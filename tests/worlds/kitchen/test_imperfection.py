@@ -133,6 +133,21 @@ def test_a_hard_fall_breaks_what_is_fragile() -> None:
         assert kitchen.state("Mug-1", "broken") == broken
 
 
+def test_what_lies_on_a_plate_that_falls_does_not_stay_on_it() -> None:
+    kitchen = always("slip", "Plate-1@CounterTop-1", "Potato-1@Plate-1")
+    ends(kitchen, "pick_up(Plate)", DONE)
+    ends(kitchen, "navigate_to_obj(Microwave)", DONE)
+    assert kitchen.parent("Plate-1") == kitchen.parent("Potato-1") == "Floor-1"
+
+
+def test_an_egg_breaks_in_the_bowl_that_falls_and_stays_in_it() -> None:
+    kitchen = always("slip", "Bowl-1@CounterTop-1", "Egg-1@Bowl-1")
+    ends(kitchen, "pick_up(Bowl)", DONE)
+    ends(kitchen, "navigate_to_obj(DiningTable)", DONE)
+    assert kitchen.parent("Bowl-1") == "Floor-1"
+    assert kitchen.parent("EggCracked-1") == "Bowl-1"
+
+
 def test_an_arm_that_balks_keeps_what_it_holds() -> None:
     kitchen = always("balk", MUG)
     kitchen.do("pick_up(Mug)")

@@ -222,7 +222,7 @@ class ImperfectMotions(Motions):
             home.fall(loose)
             robot.lost, robot.mistaken = True, None
             hard = float(self._stream("fall", category_of(loose)).random()) < self._rates.hard
-            effects.crash(home, loose, hard)
+            _hit_the_floor(home, loose, hard)
 
     def take(self, robot: Robot, name: str) -> None:
         """See `Motions`."""
@@ -313,7 +313,7 @@ def _put_first(home: Household, name: str, places: Iterable[str]) -> bool:
         try:
             if category_of(place) == FLOOR:
                 home.fall(name)
-                effects.crash(home, name, hard=False)
+                _hit_the_floor(home, name, hard=False)
             else:
                 home.put(name, place)
                 effects.arrived(home, name, place)
@@ -321,6 +321,16 @@ def _put_first(home: Household, name: str, places: Iterable[str]) -> bool:
             continue
         return True
     return False
+
+
+def _hit_the_floor(home: Household, name: str, hard: bool) -> None:
+    """What a fall does; what lay in or on the thing and can be taken out lies beside it then."""
+    effects.crash(home, name, hard)
+    floor = home.parent(name)
+    for thing in home.contents(name):
+        if floor is not None and home.category(thing).pickupable:
+            with suppress(SceneError):
+                home.put(thing, floor)
 
 
 def _next_to(home: Household, name: str) -> str | None:
