@@ -1,6 +1,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import permutations
 
+import numpy as np
 import pytest
 
 from forestall.domain.load import shipped
@@ -212,3 +214,40 @@ def test_what_was_made_is_so_from_the_moment_when_it_was_made() -> None:
     assert _harm(goal, graph, (), events) == ((6.0, "Apple-1 was sliced"),)
     at_the_start = ((0.0, "sliced(AppleSliced)=sliced from the start"),)
     assert _harm(goal, graph) == at_the_start
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_nearest_binding_is_that_of_trying_them_all(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mugs = [
+        _node(f"Mug-{k}", filled=str(rng.choice(["empty", "coffee"])), dirty="clean")
+        for k in range(1, 4)
+    ]
+    places = (_node("CounterTop-1"), _node("DiningTable-1"))
+    lie = tuple(
+        Relation(m.id, "on_top_of", str(rng.choice(["CounterTop-1", "DiningTable-1"])))
+        for m in mugs
+    )
+    graph = SceneGraph((*mugs, *places), lie)
+    goal = _goal(
+        *("filled(?a)=coffee", "on_top_of(?a, ?t)", "filled(?b)=empty", "on_top_of(?b, ?t)"),
+        never=["dirty(?b)=dirty", "spoiled(?a)"],
+        a="Mug",
+        b="Mug",
+        t="DiningTable",
+    )
+    spoiled = ["Mug-1"] if seed % 2 else []
+    counts = [
+        len(_check(_goal(*(str(x.bind({"?a": a.id, "?b": b.id, "?t": "DiningTable-1"}))
+                           for x in goal.literals),
+                         never=["dirty(Mug)=dirty", f"spoiled({a.id})"]), graph, spoiled)[2])
+        for a, b in permutations(mugs, 2)
+    ]  # fmt: skip
+    assert len(_check(goal, graph, spoiled)[2]) == min(counts)
+
+
+def test_many_variables_of_one_category_are_bound_one_after_the_other() -> None:
+    mugs = tuple(_node(f"Mug-{k}", filled="coffee" if k > 8 else "empty") for k in range(1, 17))
+    names = [f"m{k}" for k in range(8)]
+    goal = _goal(*(f"filled(?{n})=coffee" for n in names), **dict.fromkeys(names, "Mug"))
+    assert _check(goal, SceneGraph(mugs, ()))[0]

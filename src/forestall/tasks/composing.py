@@ -35,6 +35,7 @@ class Candidate:
         since: before which step of the plan (from 0) it is there to be known.
         watch: what must be in view for that: ("thing", name), or ("inside", container) for what is
             missing there; () where it shows by itself.
+        also: `since` and `watch` of what else is different; what shows first counts.
     """
 
     task: str
@@ -44,6 +45,7 @@ class Candidate:
     faults: tuple[Fault, ...]
     since: int = 0
     watch: tuple[str, ...] = ()
+    also: tuple[tuple[int, tuple[str, ...]], ...] = ()
 
 
 class Composed:

@@ -176,6 +176,7 @@ class Drawer:
                     looking,
                     candidate.watch,
                     candidate.since,
+                    candidate.also,
                 )
             )
             so_far = label(plays, usual)
@@ -231,6 +232,7 @@ class Drawer:
                 (*one.faults, *other.faults),
                 one.since,
                 one.watch,
+                ((other.since, other.watch),),
             )
 
     def _ways(self) -> list[Candidate]:

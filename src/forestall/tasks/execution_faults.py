@@ -101,17 +101,17 @@ class FaultyEnvironment:
                 command = self._misled(command, fault)
             if fault.kind != "drop":
                 self._done[index] += 1
-        lets_go = self._lets_go(command)
-        if lets_go:
+        places = lets_go(self._domain, command)
+        if places:
             self._inner.approach(command.args[-1])
             self._drop(due)
         outcome = self._pretend(command) if silent else self._inner.execute(command)
-        if not lets_go:
+        if not places:
             self._drop(due)
         for index in due:
             if self._faults[index].kind == "meanwhile":
                 self._meddle(self._faults[index])
-        if self._takes(subtask) and outcome.status is SkillStatus.SUCCEEDED:
+        if takes_up(self._domain, subtask) and outcome.status is SkillStatus.SUCCEEDED:
             self._mistaken -= {i for i in self._mistaken if self._is_right(i, subtask.args[0])}
             self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
         return outcome
@@ -130,21 +130,6 @@ class FaultyEnvironment:
             happened = self._disturbance.alter(thing, *changed)
         self._undone += not happened
 
-    def _lets_go(self, subtask: Subtask) -> bool:
-        """Whether a skill puts what the hand holds somewhere."""
-        skill, containing = self._domain.skill(subtask.skill), self._domain.containing
-        return skill.hand is not None and any(
-            f.predicate in containing and f.args[:1] == (skill.hand,)
-            for e in skill.effects
-            for f in e.facts
-        )
-
-    def _takes(self, subtask: Subtask) -> bool:
-        """Whether a skill takes something into the hand."""
-        holding = self._domain.roles.holding
-        effects = self._domain.skill(subtask.skill).effects
-        return any(f.predicate == holding and f.value == "true" for e in effects for f in e.facts)
-
     def _notice(self, subtask: Subtask) -> None:
         """A mistake ends for good when a subtask names the wrong thing."""
         for index in sorted(self._mistaken):
@@ -156,7 +141,7 @@ class FaultyEnvironment:
     def _mixed_up(self, subtask: Subtask) -> Subtask:
         """The subtask with what is taken for something else; picking up looks anew."""
         args = subtask.args
-        for index in sorted(self._mistaken) if not self._takes(subtask) else ():
+        for index in sorted(self._mistaken) if not takes_up(self._domain, subtask) else ():
             by = _acts_on(self._faults[index])
             args = tuple(by if self._is_right(index, a) else a for a in args)
         return Subtask(subtask.skill, args)
@@ -222,6 +207,23 @@ class FaultyEnvironment:
         if drive is not None and subtask.skill != drive.name:
             self._inner.execute(Subtask(drive.name, subtask.args[-1:]))
         return SkillOutcome(SkillStatus.SUCCEEDED, self._inner.time_s - before)
+
+
+def takes_up(domain: Domain, step: Subtask) -> bool:
+    """Whether a step takes something into a hand."""
+    effects = domain.skill(step.skill).effects
+    holding = domain.roles.holding
+    return any(f.predicate == holding and f.value == "true" for e in effects for f in e.facts)
+
+
+def lets_go(domain: Domain, step: Subtask) -> bool:
+    """Whether a step puts what the hand holds somewhere."""
+    skill = domain.skill(step.skill)
+    return skill.hand is not None and any(
+        f.predicate in domain.containing and f.args[:1] == (skill.hand,)
+        for e in skill.effects
+        for f in e.facts
+    )
 
 
 def _acts_on(fault: Activation) -> str:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 from forestall.domain.model import Domain
 from forestall.domain.truth import truth
@@ -173,34 +172,109 @@ def _best(
     used = {a for literal in (*literals, *never) for a in literal.args}
     chosen = [(v, c) for v, c in variables if v in used]
     missing = tuple(f"there is no {c}" for _, c in chosen if not history.graph.of_category(c))
-    best: tuple[int, int, tuple[str, ...]] | None = None
-    for binding in _bindings(chosen, history.graph):
-        unmet = tuple(
-            f"{ground} does not hold in the end{history.why(ground)}"
-            for ground in (literal.bind(binding) for literal in literals)
-            if not history.holds(ground)
-        )
-        wrong = tuple(
-            f"{ground} must never be{history.cause(ground)}"
-            for ground in (literal.bind(binding) for literal in never)
-            if history.happened(ground)
-        )
-        failures = (*missing, *unmet, *wrong)
-        if best is None or (len(failures), len(unmet)) < best[:2]:
-            best = (len(failures), len(unmet), failures)
-        if not failures:
-            break
-    return ("no binding of the goal's variables is possible",) if best is None else best[2]
+    nearest = _Nearest(chosen, literals, never, history)
+    binding = nearest.find()
+    if binding is None:
+        return ("no binding of the goal's variables is possible",)
+    unmet = tuple(
+        f"{ground} does not hold in the end{history.why(ground)}"
+        for ground in (literal.bind(binding) for literal in literals)
+        if not history.holds(ground)
+    )
+    wrong = tuple(
+        f"{ground} must never be{history.cause(ground)}"
+        for ground in (literal.bind(binding) for literal in never)
+        if history.happened(ground)
+    )
+    return (*missing, *unmet, *wrong)
 
 
-def _bindings(
-    variables: Sequence[tuple[str, str]], graph: SceneGraph
-) -> Iterator[Mapping[str, str]]:
-    """Every binding to different instances; a category that is not there stands for itself."""
-    choices = [[n.id for n in graph.of_category(c) if n.id != GRIPPER] or [c] for _, c in variables]
-    for names in product(*choices):
-        if len(set(names)) == len(names):
-            yield {v: n for (v, _), n in zip(variables, names, strict=True)}
+class _Nearest:
+    """Looks for the best binding variable by variable.
+
+    What a literal comes to is counted as soon as its variables are bound; a branch is left on which
+    at least as much fails as under the best binding so far, with what must fail of the literals
+    about one later variable. Variables are bound to different instances; a category that is not
+    there stands for itself.
+    """
+
+    def __init__(
+        self,
+        variables: Sequence[tuple[str, str]],
+        literals: Sequence[Literal],
+        never: Sequence[Literal],
+        history: _History,
+    ) -> None:
+        self._choices = [
+            (v, [n.id for n in history.graph.of_category(c) if n.id != GRIPPER] or [c])
+            for v, c in variables
+        ]
+        order = {v: k for k, (v, _) in enumerate(variables, 1)}
+        self._literals = _by_last(literals, order)
+        self._never = _by_last(never, order)
+        self._history = history
+        self._known: dict[tuple[bool, Literal], bool] = {}
+        self._ahead = [(0, 0)]
+        for at in range(len(self._choices), 0, -1):
+            least = self._least(at)
+            self._ahead.insert(0, (self._ahead[0][0] + least[0], self._ahead[0][1] + least[1]))
+        self._best: tuple[int, int] | None = None
+        self._binding: dict[str, str] | None = None
+
+    def find(self) -> Mapping[str, str] | None:
+        """The first of the best bindings; None where there are too few instances."""
+        self._descend({}, 0, 0)
+        return self._binding
+
+    def _least(self, at: int) -> tuple[int, int]:
+        """How many of the literals about one variable alone fail at least, in all and unmet."""
+        variable, names = self._choices[at - 1]
+        alone = [
+            [x for x in several.get(at, ()) if {a for a in x.args if a[0] == "?"} == {variable}]
+            for several in (self._literals, self._never)
+        ]
+        counts = [
+            tuple(
+                sum(self._fails(x.bind({variable: n}), never) for x in literals)
+                for literals, never in zip(alone, (False, True), strict=True)
+            )
+            for n in names
+        ]
+        return min(map(sum, counts)), min(unmet for unmet, _ in counts)
+
+    def _descend(self, binding: dict[str, str], unmet: int, wrong: int) -> None:
+        at = len(binding)
+        unmet += sum(self._fails(x.bind(binding), False) for x in self._literals.get(at, ()))
+        wrong += sum(self._fails(x.bind(binding), True) for x in self._never.get(at, ()))
+        failing, still = self._ahead[at]
+        if self._best is not None and (unmet + wrong + failing, unmet + still) >= self._best:
+            return
+        if at == len(self._choices):
+            self._best, self._binding = (unmet + wrong, unmet), binding
+            return
+        variable, names = self._choices[at]
+        for name in names:
+            if name not in binding.values():
+                self._descend(binding | {variable: name}, unmet, wrong)
+
+    def _fails(self, ground: Literal, never: bool) -> bool:
+        key = (never, ground)
+        if key not in self._known:
+            history = self._history
+            self._known[key] = history.happened(ground) if never else not history.holds(ground)
+        return self._known[key]
+
+
+def _by_last(
+    literals: Sequence[Literal], order: Mapping[str, int]
+) -> Mapping[int, Sequence[Literal]]:
+    """Literals by how many variables are bound once all of theirs are."""
+    found: dict[int, list[Literal]] = {}
+    for literal in literals:
+        found.setdefault(max((order.get(a, 0) for a in literal.args), default=0), []).append(
+            literal
+        )
+    return found
 
 
 __all__ = ["TruthGoalChecker", "irreversible"]

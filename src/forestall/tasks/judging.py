@@ -85,6 +85,7 @@ def play(
     looking: bool = False,
     watch: Sequence[str] = (),
     since: int = 0,
+    also: Sequence[tuple[int, Sequence[str]]] = (),
 ) -> Played:
     """Play a task with a scenario's faults in one room.
 
@@ -96,7 +97,9 @@ def play(
         looking: whether to keep what is compared before each step.
         watch: ("thing", name) or ("inside", container): what `visible` is about.
         since: the first step before which it counts.
+        also: `since` and `watch` of what else is different.
     """
+    shows = ((since, watch), *also)
     task, domain = loaded.task, loaded.domain
     faults = () if scenario is None else scenario.faults
     try:
@@ -109,12 +112,11 @@ def play(
             before = left(opened.oracle.truth(), domain)
             refused, seen, stumbled = [], [], False
             told = [len(opened.oracle.events())]
-            visible = None if watch else since
+            visible = None
             for at, step in enumerate(plan):
-                if (
-                    visible is None
-                    and at >= since
-                    and _in_view(opened.oracle.truth(), watch, domain)
+                if visible is None and any(
+                    at >= first and _in_view(opened.oracle.truth(), what, domain)
+                    for first, what in shows
                 ):
                     visible = at
                 if looking:
@@ -192,6 +194,8 @@ def fixtures_in(world: WorldPart, loaded: LoadedTask, seed: int) -> set[str]:
 
 
 def _in_view(graph: SceneGraph, watch: Sequence[str], domain: Domain) -> bool:
+    if not watch:
+        return True
     sort, name = watch
     if sort == "inside":
         return not _is_shut(graph, name, domain)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from forestall.tasks.composing import Candidate, Composed, counted, named
+from forestall.tasks.execution_faults import lets_go, takes_up
 from forestall.tasks.faults import Drop, FailedAction, Fault, Meanwhile
 from forestall.tasks.scene_faults import AddObject
 from forestall.types.plan import Plan, Subtask
@@ -109,8 +110,19 @@ class MidrunComposer(Composed):
             f"While the robot works, after {named(step, number)}, {told}.",
             (*more, then),
             since=at + 1,
-            watch=() if kind in ("put-away", "moved") else ("thing", change.object),
+            watch=() if self._misses(change) else ("thing", change.object),
         )
+
+    def _misses(self, change: Meanwhile) -> bool:
+        """Whether a thing of the task is no longer where it was, which shows there."""
+        return change.place is not None and change.object in {o.id for o in self.task.scene.objects}
+
+    def _carries(self, plan: Plan, at: int) -> bool:
+        """Whether the robot has something in its hand before a step."""
+        for step in reversed(plan.subtasks[:at]):
+            if takes_up(self.domain, step) or lets_go(self.domain, step):
+                return takes_up(self.domain, step)
+        return False
 
     def _slips(self, plan: Plan) -> Iterator[Candidate]:
         """A step that comes to nothing, and a thing that is lost from the hand."""
@@ -126,7 +138,7 @@ class MidrunComposer(Composed):
                     (FailedAction(step=str(step), occurrence=number),),
                     since=int(at) + 1,
                 )
-            if skill.drives:
+            if skill.drives and self._carries(plan, int(at)):
                 yield Candidate(
                     self.task.name,
                     "dropped",

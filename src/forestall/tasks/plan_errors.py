@@ -122,7 +122,7 @@ class ErringPlanner:
             return None
         step, number = counted(self.plan, self.acts[place])
         anchor = self.plan.subtasks[self.acts[other]]
-        if anchor == step:
+        if anchor == step or self.plan.subtasks.count(anchor) > 1:
             return None
         way = {"after" if shift > 0 else "before": str(anchor)}
         fault = MoveStep(step=str(step), occurrence=number, **way)
@@ -167,7 +167,10 @@ class ErringPlanner:
         steps = [_renamed(s, {need.id, need.category}, other) for s in self.plan]
         plan = _whole(steps)
         if there:
-            return (AddObject(category=other), plan), f"the plan takes {other} for {need.category}"
+            return (
+                AddObject(category=other),
+                plan,
+            ), f"the plan uses {other} in place of {need.category}"
         numbered = f"{need.category}-{int(self.rng.integers(3, 9))}"
         if self.rng.random() < 0.5:
             steps = [_renamed(s, {need.id, need.category}, numbered) for s in self.plan]

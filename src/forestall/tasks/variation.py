@@ -18,6 +18,7 @@ from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
 from forestall.errors import InputError
 from forestall.planning.validate import GraphValidator, observed, run
+from forestall.tasks.execution_faults import takes_up
 from forestall.tasks.faults import FailedAction, Fault
 from forestall.tasks.files import LoadedTask, load_task, long_task_names, task_names
 from forestall.testing.symbolic_scene import start_scene
@@ -295,13 +296,6 @@ def room_fixtures(loaded: LoadedTask) -> set[str]:
         if other.task.scene.room == loaded.task.scene.room:
             found |= fixtures_of(other.task, other.domain)
     return found
-
-
-def takes_up(domain: Domain, step: Subtask) -> bool:
-    """Whether a step takes something into a hand."""
-    effects = domain.skill(step.skill).effects
-    holding = domain.roles.holding
-    return any(f.predicate == holding and f.value == "true" for e in effects for f in e.facts)
 
 
 def _pairs(domain: Domain) -> list[tuple[Skill, Skill]]:
