@@ -12,7 +12,14 @@ import pytest
 from forestall.tasks.aftermath import superfluous
 from forestall.tasks.composing import Candidate
 from forestall.tasks.drawing import Drawer, moments
-from forestall.tasks.faults import apply_plan_faults, apply_scene_faults, check_steps, parse_fault
+from forestall.tasks.faults import (
+    Meanwhile,
+    apply_plan_faults,
+    apply_scene_faults,
+    check_steps,
+    parse_fault,
+    wrap,
+)
 from forestall.tasks.files import Scenario, load_task, task_names
 from forestall.tasks.judging import Label, Played, fixtures_in, label, play
 from forestall.tasks.midrun_candidates import MidrunComposer
@@ -112,6 +119,52 @@ def test_two_at_once_are_two_that_fail_each_by_itself() -> None:
         assert any({repr(pair.faults[:k]), repr(pair.faults[k:])} <= failing for k in cuts), (
             pair.kind
         )
+
+
+def test_two_at_once_are_known_by_what_shows_first() -> None:
+    loaded = load_task("boil-water")
+    faults = (
+        parse_fault({"kind": "add_object", "category": "Potato", "places": ["Pot-1"]}),
+        parse_fault({"kind": "move_object", "object": "Pot-1", "places": ["Cabinet"]}),
+    )
+    scenario = Scenario("x", "boil-water", "", "", "", faults)
+    hidden = ("thing", "Potato-1")
+    alone = play(WORLD, loaded, scenario, 1, watch=hidden)
+    both = play(WORLD, loaded, scenario, 1, watch=hidden, also=((0, ()),))
+    later = play(WORLD, loaded, scenario, 1, watch=hidden, also=((3, ()),))
+    assert (alone.visible, both.visible, later.visible) == (len(loaded.task.plan), 0, 3)
+
+
+@pytest.mark.parametrize("task", ["store-egg", "boil-water", "make-salad"])
+def test_only_what_is_held_is_lost(task: str) -> None:
+    loaded = load_task(task)
+    drops = [
+        c
+        for seed in range(20)
+        for c in MidrunComposer(loaded, np.random.default_rng(seed)).midrun(loaded.task.plan)
+        if c.kind == "dropped"
+    ]
+    assert drops
+    for candidate in {c.cause: c for c in drops}.values():
+        step = loaded.task.plan.subtasks[candidate.since - 1]
+        scenario = Scenario("x", task, "", "", "", candidate.faults)
+        with WORLD.open(loaded.task.scene, loaded.domain) as opened:
+            env = wrap(opened.environment, scenario.faults, opened.disturbance, loaded.domain)
+            env.reset(1)
+            for done in loaded.task.plan.subtasks[: candidate.since]:
+                before = opened.oracle.truth().holding
+                env.execute(done)
+        assert done == step and before is not None
+
+
+def test_a_thing_of_the_task_that_is_put_elsewhere_is_missed_where_it_was() -> None:
+    loaded = load_task("make-salad")
+    composer = MidrunComposer(loaded, np.random.default_rng(0), ["Fridge", "Cabinet"])
+    for candidate in composer.midrun(loaded.task.plan):
+        change = candidate.faults[-1]
+        if isinstance(change, Meanwhile) and change.place is not None:
+            own = change.object in {o.id for o in loaded.task.scene.objects}
+            assert (candidate.watch == ()) == own
 
 
 def test_a_change_that_could_not_happen_makes_no_start() -> None:
