@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 
 from forestall.tasks.composing import Candidate, begun, counted, named
+from forestall.tasks.execution_faults import lets_go
 from forestall.tasks.faults import (
     DropStep,
     Fault,
@@ -164,23 +165,20 @@ class ErringPlanner:
         need = own[int(self.rng.integers(len(own)))]
         alike = sorted(self.others, key=lambda c: -self._alike(c, need.category))[:4]
         other = alike[int(self.rng.integers(len(alike)))]
-        steps = [_renamed(s, {need.id, need.category}, other) for s in self.plan]
-        plan = _whole(steps)
+        names = {need.id, need.category}
         if there:
-            return (
-                AddObject(category=other),
-                plan,
-            ), f"the plan uses {other} in place of {need.category}"
-        numbered = f"{need.category}-{int(self.rng.integers(3, 9))}"
-        if self.rng.random() < 0.5:
-            steps = [_renamed(s, {need.id, need.category}, numbered) for s in self.plan]
-            return (_whole(steps),), f"the plan speaks of {numbered}, which is not there"
-        return (plan,), f"the plan speaks of {other}, which the task does not have"
+            plan = _whole([_renamed(s, names, other) for s in self.plan])
+            told = f"the plan uses {other} in place of {need.category}"
+            return (AddObject(category=other), plan), told
+        of = need.category if self.rng.random() < 0.5 else other
+        numbered = f"{of}-{int(self.rng.integers(3, 9))}"  # clutter has no third of anything
+        plan = _whole([_renamed(s, names, numbered) for s in self.plan])
+        return (plan,), f"the plan speaks of {numbered}, which is not there"
 
     def _other_place(self) -> Error | None:
-        """A thing is put, or something is done, at another place of the room."""
+        """A thing is put at another place of the room."""
         domain = self.domain
-        puts = [k for k in self.acts if domain.skill(self.plan.subtasks[k].skill).hand is not None]
+        puts = [k for k in self.acts if lets_go(domain, self.plan.subtasks[k])]
         puts = [k for k in puts if len(self.plan.subtasks[k].args) > 1]
         if not puts:
             return None
