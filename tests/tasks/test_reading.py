@@ -2,6 +2,7 @@
 
 `tests/tasks/reading/SET.toml` has an entry for each start read: its name, a verdict (ok, mended,
 left in spite of a doubt, removed) and why. Counts of docs/experiments.md are held against them.
+`slips.toml` has the same of undisturbed runs of the honest household, by task and seed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ READ = {
     p.stem: tomllib.loads(p.read_text("utf-8"))["read"]
     for p in sorted(Path(__file__).with_name("reading").glob("*.toml"))
 }
+SLIPS = READ.pop("slips")
 DOCS = Path(__file__).parents[2] / "docs" / "experiments.md"
 LEAST = 40
 VERDICTS = ("ok", "mended", "left", "removed")
@@ -54,6 +56,17 @@ def test_the_docs_count_what_was_read(of: str) -> None:
     row = re.search(rf"^\| `{of}` \|((?: \d+ \|){{5}})$", DOCS.read_text("utf-8"), re.MULTILINE)
     assert row is not None, f"docs/experiments.md has no row of what was read of {of}"
     assert [int(n) for n in re.findall(r"\d+", row[1])] == numbers
+
+
+def test_enough_runs_of_the_honest_household_are_read_in_rooms_to_look_at() -> None:
+    runs = {(entry["task"], entry["seed"]) for entry in SLIPS}
+    assert LEAST <= len(runs) == len(SLIPS)
+    assert {task for task, _ in runs} == set(task_names())
+    assert all(10_000 <= seed < 20_000 for _, seed in runs)
+    for entry in SLIPS:
+        assert entry.keys() == {"task", "seed", "verdict", "reason"}
+        assert entry["verdict"] in VERDICTS[:3]
+        assert entry["reason"].endswith(".") and len(entry["reason"]) < 160
 
 
 def test_the_sets_that_were_read_are_still_over_all_tasks() -> None:
