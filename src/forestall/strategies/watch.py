@@ -27,8 +27,8 @@ class Watch:
     """Judges each subtask before it starts, and lets it start.
 
     The detector is the primary judge: it asks for another look whenever it wants one, and its alarm
-    is diagnosed and stays in the record as an alarm that nothing came of. Every other judge has a
-    few looks of its own in a run; all of them judge what is seen then.
+    is diagnosed and stays in the record as an alarm that nothing came of. Every other judge can
+    have a few looks of its own in a run; all of them judge what is seen then.
 
     Args:
         retriever: finds the references, the same for all that bring none of their own.
@@ -50,7 +50,7 @@ class Watch:
         detector: Detector,
         judges: Sequence[Judge],
         reasoner: Reasoner,
-        looks_each: int = 2,
+        looks_each: int = 0,
     ) -> None:
         names = [detector.name, *(j.name for j in judges)]
         twice = sorted(n for n, count in Counter(names).items() if count > 1)

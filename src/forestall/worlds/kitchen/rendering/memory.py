@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+import os
 from collections import OrderedDict
 from collections.abc import Iterator
 
 from forestall.worlds.kitchen.rendering.drawn import Drawn
 
 
+LEAST_BYTES, MOST_BYTES = 600_000_000, 2_500_000_000
+"""Of remembered frames: about 110 and 460 of them."""
+
+SHARE = 0.1
+"""Of the machine's memory between these: several processes remember at once."""
+
+
+def share_of_memory() -> int:
+    """Bytes of frames that a process may remember on this machine."""
+    try:
+        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):  # a system that does not tell
+        return LEAST_BYTES
+    return min(max(int(SHARE * there), LEAST_BYTES), MOST_BYTES)
+
+
 class FrameMemory:
     """The frames drawn last, up to a number of bytes; one for each process.
 
     Args:
-        most_bytes: of pictures, depths, ids and what they were made from together.
+        most_bytes: of pictures, depths, ids and what they were made from together; a share of the
+            machine's memory by default.
     """
 
-    def __init__(self, most_bytes: int = 600_000_000) -> None:
-        self._most = most_bytes
+    def __init__(self, most_bytes: int | None = None) -> None:
+        self._most = share_of_memory() if most_bytes is None else most_bytes
         self._bytes = 0
         self._frames: OrderedDict[bytes, tuple[Drawn, bytes]] = OrderedDict()
         self._places: dict[bytes, list[bytes]] = {}
