@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from rows_by_hand import failing, good, judged, seen
 
 from forestall.errors import InputError
-from forestall.statistics.intervals import Metric, bootstrap, mean, paired, proportion, rate
+from forestall.statistics.intervals import Metric, bootstrap, mean, proportion, rate
 from forestall.statistics.metrics import (
     ALWAYS,
     NEVER,
@@ -19,6 +19,7 @@ from forestall.statistics.metrics import (
     point_metrics,
     trivial,
 )
+from forestall.statistics.pairs import paired
 from forestall.statistics.watches import Watches, canonical
 
 

@@ -6,12 +6,11 @@ bootstrap, at each place for itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from forestall.statistics.intervals import LEVEL, Floats, divided
+from forestall.statistics.intervals import Floats, bands, divided
 from forestall.statistics.sweep import Line, Sample, best_at, cumulated, sample
 from forestall.statistics.watches import ALL
 
@@ -113,8 +112,4 @@ def _levels(scores: Floats) -> Floats:
 
 
 def _band(drawn: Floats) -> tuple[float | None, float | None]:
-    there: Sequence[float] | Floats = drawn[~np.isnan(drawn)]
-    if not len(there):
-        return None, None
-    low, high = np.percentile(there, [50 * (1 - LEVEL), 50 * (1 + LEVEL)])
-    return float(low), float(high)
+    return bands(drawn[:, None])[0] or (None, None)

@@ -61,7 +61,9 @@ def further_tables(content: Content, names: Names) -> list[Table]:
         _judges_by_model(content, names),
         _strategies_by_model(content, names),
         _demonstrations(content, names),
-        compared_table("comparisons", "What else is compared", content["comparisons"], names),
+        compared_table(
+            "comparisons", "What else is compared", content["comparisons"], names, by="topic"
+        ),
         _limits(content, names),
         _unforeseeable(content),
         _rooms(content, names),
@@ -69,9 +71,9 @@ def further_tables(content: Content, names: Names) -> list[Table]:
 
 
 def compared_table(
-    name: str, title: str, found: Sequence[Mapping[str, Any]], names: Names
+    name: str, title: str, found: Sequence[Mapping[str, Any]], names: Names, by: str = "table"
 ) -> Table:
-    """One line for each ordering of a family."""
+    """One line for each ordering; `by` says what a family is, the table or a topic."""
     rows = [
         (
             o["topic"],
@@ -88,7 +90,6 @@ def compared_table(
         )
         for o in found
     ]
-    count = sum(o["p"] is not None for o in found)
     return Table(
         name,
         title,
@@ -98,8 +99,8 @@ def compared_table(
         ),
         tuple(rows),
         "An ordering holds when the interval of the difference on the same runs lies above 0. p is "
-        "two-sided, from the same draws (of strategies the larger of it and McNemar's); corrected "
-        f"by Holm's method over the {count} comparisons of this table, at 0.05.",
+        "two-sided, by the deviation of the draws (of strategies the larger of it and McNemar's); "
+        f"corrected at 0.05 by Holm's method for all of one {by}.",
     )
 
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest
+from scipy.stats import binomtest, norm
 
 from forestall.errors import InputError
 
@@ -31,6 +31,7 @@ LEVEL = 0.95
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
+Band = tuple[float, float] | None
 Statistic = Callable[[Floats], Floats]
 """Weights of the runs (draws, runs) → value in each draw (draws,), NaN where it has none."""
 
@@ -52,7 +53,7 @@ class Metric:
         method: of the interval: "exact" (Clopper-Pearson, where no two runs share a room or a
             scenario), "bootstrap over rooms", "bootstrap over rooms and scenarios" or "none".
         count: the numerator, where the value is a share of `n`.
-        p: of a difference: two-sided, that there is none, from the same draws.
+        p: of a difference: two-sided, that there is none, by the deviation of the draws.
     """
 
     value: float | None
@@ -158,6 +159,13 @@ class Ratio:
     n: int | None = None
     whole: bool = True
 
+    @property
+    def share(self) -> bool:
+        """Whether it is a share of runs that either have it or not."""
+        there = self.below[self.below > 0]
+        one = bool((there == 1).all() and np.isin(self.above, (0.0, 1.0)).all())
+        return self.whole and self.n is None and one
+
 
 def measured(
     ratios: Mapping[str, Ratio],
@@ -179,70 +187,78 @@ def measured(
         return {}
     if not len(clusters):
         return dict.fromkeys([*ratios, *(mixed or {})], NOTHING)
-    names = list(ratios)
+    names, half = list(ratios), len(ratios)
     sums = np.stack([*(ratios[n].above for n in names), *(ratios[n].below for n in names)], axis=1)
-    whole = sums.sum(axis=0)
     used = np.flatnonzero(sums.any(axis=1))
     weights = clusters.weights
     few = 2 * len(used) < len(clusters)
     drawn = weights[:, used] @ sums[used] if few else weights @ sums
-    half = len(names)
-    values = {n: _quotient(whole[k], whole[half + k]) for k, n in enumerate(names)}
-    draws = {n: divided(drawn[:, k], drawn[:, half + k]) for k, n in enumerate(names)}
-    found = {n: _of_ratio(ratios[n], values[n], draws[n], clusters) for n in names}
-    for name, parts in (mixed or {}).items():
-        value = sum(factor * values[part] for part, factor in parts.items())
-        line = np.sum([factor * draws[part] for part, factor in parts.items()], axis=0)
-        where = np.any([ratios[part].below > 0 for part in parts], axis=0)
-        found[name] = _from_draws(value, line, int(where.sum()), where, clusters, differ=True)
+    whole = sums.sum(axis=0, keepdims=True)
+    parts = dict(zip(names, divided(whole[:, :half], whole[:, half:])[0], strict=True))
+    draws = divided(drawn[:, :half], drawn[:, half:])
+    found = {
+        name: _of_ratio(ratios[name], float(parts[name]), band, clusters)
+        for name, band in zip(names, bands(draws), strict=True)
+    }
+    for name, factors in (mixed or {}).items():
+        value = sum(factor * float(parts[part]) for part, factor in factors.items())
+        line = sum(factor * draws[:, names.index(part)] for part, factor in factors.items())
+        where = np.any([ratios[part].below > 0 for part in factors], axis=0)
+        found[name] = _whole(value, np.asarray(line), int(where.sum()), where, clusters, True)
     return found
 
 
-def _quotient(above: float, below: float) -> float:
-    return float(above / below) if below > 0 else np.nan
+def bands(drawn: Floats) -> list[Band]:
+    """Percentile intervals of columns of draws, None where none has a value."""
+    ordered = np.sort(drawn, axis=0)  # what has no value comes last
+    count = (~np.isnan(drawn)).sum(axis=0)
+    found: list[Band] = []
+    for column, n in zip(ordered.T, count, strict=True):
+        ends = [(n - 1) * (1 - LEVEL) / 2, (n - 1) * (1 + LEVEL) / 2]
+        low, high = np.interp(ends, np.arange(n), column[:n]) if n else (None, None)
+        found.append(None if low is None or high is None else (float(low), float(high)))
+    return found
 
 
-def _of_ratio(ratio: Ratio, value: float, drawn: Floats, clusters: Clusters) -> Metric:
+def _of_ratio(ratio: Ratio, value: float, band: Band, clusters: Clusters) -> Metric:
     n = round(float(ratio.below.sum())) if ratio.n is None else ratio.n
     if np.isnan(value) or n == 0:
         return Metric(None, None, None, n)
     where = ratio.below > 0
     count = round(float(ratio.above.sum())) if ratio.whole else None
-    share = bool(ratio.whole and (ratio.below[where] == 1).all() and (ratio.above <= 1).all())
-    if share and count is not None and ratio.n is None and clusters.independent(where):
+    if ratio.share and count is not None and clusters.independent(where):
         return Metric(value, *_clopper_pearson(count, n), n, EXACT, count)
-    found = _from_draws(value, drawn, n, where, clusters, count)
-    if found.low is not None and found.low == found.high and ratio.n is None:
-        units = clusters.rooms_in(where)
-        if value in (0.0, 1.0):
-            exact = _clopper_pearson(round(value * units), units)
-            return Metric(value, *exact, n, EXACT, count)
-    return found
+    rooms = clusters.rooms_in(where)
+    if rooms < 2 or band is None:
+        return Metric(value, None, None, n, NONE, count)
+    if band[0] == band[1] and ratio.n is None and value in (0.0, 1.0):
+        return Metric(value, *_clopper_pearson(round(value * rooms), rooms), n, EXACT, count)
+    return Metric(value, *band, n, clusters.method, count)
 
 
-def _from_draws(
-    value: float,
-    drawn: Floats,
-    n: int,
-    where: Bools,
-    clusters: Clusters,
-    count: int | None = None,
-    differ: bool = False,
+def _whole(
+    value: float, drawn: Floats, n: int, where: Bools, clusters: Clusters, differ: bool
 ) -> Metric:
+    """A number with the interval of its draws."""
     if np.isnan(value) or n == 0:
         return Metric(None, None, None, n)
-    if clusters.rooms_in(where) < 2:
-        return Metric(value, None, None, n, NONE, count)
-    there = drawn[~np.isnan(drawn)]
-    low, high = np.percentile(there, [50 * (1 - LEVEL), 50 * (1 + LEVEL)])
-    p = two_sided(there) if differ else None
-    return Metric(value, float(low), float(high), n, clusters.method, count, p)
+    band = bands(drawn[:, None])[0]
+    if clusters.rooms_in(where) < 2 or band is None:
+        return Metric(value, None, None, n)
+    p = _two_sided(value, drawn[~np.isnan(drawn)]) if differ else None
+    return Metric(value, *band, n, clusters.method, None, p)
 
 
-def two_sided(drawn: Floats) -> float:
-    """How surprising the draws of a difference are if there is none: never 0."""
-    below, above = (drawn <= 0).sum() + 1, (drawn >= 0).sum() + 1
-    return float(min(1.0, 2 * min(below, above) / (len(drawn) + 1)))
+def _two_sided(value: float, drawn: Floats) -> float:
+    """How surprising a difference is if there is none, by the deviation of its draws.
+
+    Not by counting draws beyond 0: of 2000, that is never below 0.001, which no correction for
+    many comparisons would leave anything of.
+    """
+    deviation = float(drawn.std())
+    if deviation == 0:
+        return 1.0 if value == 0 else 2 / (len(drawn) + 1)
+    return float(2 * norm.sf(abs(value) / deviation))
 
 
 def bootstrap(
@@ -269,50 +285,19 @@ def bootstrap(
     if not len(clusters) or n == 0:
         return NOTHING
     value = float(statistic(np.ones((1, len(clusters))))[0])
-    if np.isnan(value):
-        return Metric(None, None, None, n)
     everywhere = np.ones(len(clusters), bool)
-    if clusters.rooms_in(everywhere) < 2:
-        return Metric(value, None, None, n)
-    drawn = statistic(clusters.weights)
-    found = _from_draws(value, drawn, n, everywhere, clusters, None, differ)
+    if np.isnan(value) or clusters.rooms_in(everywhere) < 2:
+        return Metric(None if np.isnan(value) else value, None, None, n)
+    found = _whole(value, statistic(clusters.weights), n, everywhere, clusters, differ)
     if of and found.low == found.high and value in (0.0, 1.0):
         return Metric(value, *_clopper_pearson(round(value * of), of), n, EXACT)
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Paired:
-    """How two things differ on the same runs.
-
-    Args:
-        difference: mean of first minus second, with its interval.
-        only_first: pairs in which only the first one succeeded.
-        only_second: likewise.
-        p: McNemar's exact test, two-sided, for which pairs are independent; None when nothing was
-            paired. The difference has one of its own, for which rooms and scenarios are.
-    """
-
-    difference: Metric
-    only_first: int
-    only_second: int
-    p: float | None
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data: the difference with what the tests say of it."""
-        return {
-            **self.difference.to_json(),
-            "only_first": self.only_first,
-            "only_second": self.only_second,
-            "p": self.p,
-            "p_clustered": self.difference.p,
-        }
-
-
 def proportion(hits: Sequence[bool], units: Sequence[Hashable] | None = None) -> Metric:
     """Share of runs: exact where they are independent, as they are without units."""
     clusters = Clusters.of(range(len(hits)) if units is None else units)
-    return measured({"": _of_runs(hits)}, clusters)[""]
+    return measured({"": of_runs(hits)}, clusters)[""]
 
 
 def rate(
@@ -325,27 +310,7 @@ def rate(
 
 def mean(values: Sequence[float], units: Sequence[Hashable]) -> Metric:
     """Mean over runs."""
-    return measured({"": _of_runs(values, whole=False)}, Clusters.of(units))[""]
-
-
-def paired(first: Sequence[bool], second: Sequence[bool], units: Sequence[Hashable]) -> Paired:
-    """Difference of two shares on the same runs: bootstrap, and McNemar's exact test.
-
-    Raises:
-        InputError: the sequences differ in length.
-    """
-    if not len(first) == len(second) == len(units):
-        raise InputError("pairs need as many first as second outcomes, and their rooms")
-    parts = {"first": _of_runs(first), "second": _of_runs(second)}
-    mixed = {"difference": {"first": 1.0, "second": -1.0}}
-    difference = measured(parts, Clusters.of(units), mixed)["difference"]
-    only_first = sum(a and not b for a, b in zip(first, second, strict=True))
-    only_second = sum(b and not a for a, b in zip(first, second, strict=True))
-    if not first:
-        return Paired(difference, 0, 0, None)
-    discordant = only_first + only_second
-    p = float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
-    return Paired(difference, only_first, only_second, p)
+    return measured({"": of_runs(values, whole=False)}, Clusters.of(units))[""]
 
 
 def divided(above: Floats, below: Floats) -> Floats:
@@ -355,7 +320,8 @@ def divided(above: Floats, below: Floats) -> Floats:
     return result
 
 
-def _of_runs(values: Sequence[float], whole: bool = True) -> Ratio:
+def of_runs(values: Sequence[float], whole: bool = True) -> Ratio:
+    """One value of each run, and every run once."""
     return Ratio(np.asarray(values, float), np.ones(len(values)), whole=whole)
 
 

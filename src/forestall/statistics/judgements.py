@@ -42,13 +42,14 @@ def judgements(of: Watches, failing: str) -> dict[str, Metrics]:
     """Judges, two together, with reasoning, and trivial ones on failing runs of a set, or `ALL`."""
     found: dict[str, Metrics] = {}
     for name in of.names:
-        metrics = sweep_metrics(Line.by(of, name), failing)
+        negatives = (ALL,) if is_variant(name) else NEGATIVES
+        metrics = sweep_metrics(Line.by(of, name), failing, negatives)
         for suffix, thresholds in _suffixes(name).items():
             point = point_metrics(at_thresholds(of, name, thresholds), failing)
             metrics |= {f"{metric}{suffix}": value for metric, value in point.items()}
         found[name] = metrics
     for pair in together(of.names):
-        metrics = sweep_metrics(Line.by(of, pair), failing)
+        metrics = sweep_metrics(Line.by(of, pair), failing, (ALL,))
         found[pair.name] = metrics | point_metrics(asked_together(of, pair), failing)
     for name, alarms in single_points(of).items():
         found[name] = point_metrics(alarms, failing)

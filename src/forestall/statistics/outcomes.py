@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case
-from forestall.statistics.intervals import Clusters, Metric, Paired, Ratio, mean, measured, paired
+from forestall.statistics.intervals import Clusters, Metric, Ratio, mean, measured
 from forestall.statistics.judges import PLAN_CHECK, PRIMARY
+from forestall.statistics.pairs import Paired, paired
 from forestall.statistics.rows import EXACT, NOBODY, PLAIN, EpisodeRow, Setup
 from forestall.statistics.watches import ALL, WATCH, canonical, case_of, unit_of
 

@@ -119,22 +119,22 @@ def _literal(content: Content, names: Names) -> Iterator[str]:
 
 
 def _orderings(content: Content, names: Names) -> Iterator[str]:
-    counts = Counter(o["corrected"] for o in content["orderings"])
-    if counts.keys() <= {UNMEASURED}:
+    found = [o for o in content["orderings"] if o["verdict"] != UNMEASURED]
+    if not found:
         return
-    yield ", ".join(f"{counts[v]} {_VERDICTS[v]}" for v in _VERDICTS if counts[v])
-    acted = [o for o in content["orderings"] if o["topic"] == "strategies"]
-    for o in acted:
-        if o["verdict"] != UNMEASURED:
-            yield f"{o['better']} over {o['worse']} {_VERDICTS[o['corrected']]}"
+    counts = Counter(o["corrected"] for o in found)
+    yield f"of {len(found)} " + ", ".join(
+        f"{counts[v]} {words}" for v, words in _VERDICTS.items() if counts[v]
+    )
+    for o in found:
+        if o["topic"] == "strategies":
+            yield f"{o['better']} over {o['worse']} {o['corrected']}"
+    held = [o for o in found if o["corrected"] == HOLDS and o["topic"] != "strategies"]
+    for o in held:
+        yield f"{shown(o['worse'], names)} is worse in {o['measure']}"
 
 
-_VERDICTS = {
-    HOLDS: "hold",
-    FAILS: "do not hold",
-    UNDECIDED: "are not decided",
-    UNMEASURED: "were not measured",
-}
+_VERDICTS = {HOLDS: "hold", FAILS: "do not hold", UNDECIDED: "undecided"}
 
 
 def _chance(content: Content, names: Names) -> Iterator[str]:
@@ -224,7 +224,7 @@ def _after(found: Mapping[str, Any]) -> str:
     if found["p_holm"] is None:
         return ""
     said = probability(found["p_holm"])
-    return f", p {said if said.startswith('<') else '= ' + said}"
+    return f", p after Holm {said if said.startswith('<') else '= ' + said}"
 
 
 def _percent(value: float | None) -> str:

@@ -9,6 +9,7 @@ lower of both scores (`or`) or the higher (`and`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -172,10 +173,12 @@ def detected_at(of: Sample, rate: float) -> Metric:
     return bootstrap(detection_at(of, rate), of.clusters, n, of.clusters.rooms_in(of.bad))
 
 
-def sweep_metrics(line: Line, failing: str = PAPER_SET) -> dict[str, Metric]:
+def sweep_metrics(
+    line: Line, failing: str = PAPER_SET, negatives: Sequence[str] = NEGATIVES
+) -> dict[str, Metric]:
     """Everything that needs no threshold, against each kind of negatives."""
     found: dict[str, Metric] = {}
-    for name in NEGATIVES:
+    for name in negatives:
         of = sample(line, name, failing)
         found[f"auroc_{name}"] = measured(auroc(of), of)
         found[f"average_precision_{name}"] = measured(average_precision(of), of)
