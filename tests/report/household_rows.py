@@ -100,8 +100,7 @@ def _watched(
     causes = (f"filled(Bowl-{seed % 3}) = wine",) if failing and rng.random() < 0.9 else ()
     noise = 0.03 if profile == HONEST else 0.0
     judged = tuple(
-        _judged(i, known is not None and i >= known, hard, noise, causes, rng)
-        for i in range(STEPS)
+        _judged(i, known is not None and i >= known, hard, noise, causes, rng) for i in range(STEPS)
     )
     harmed = failing and of == "irreversible"
     return EpisodeRow(

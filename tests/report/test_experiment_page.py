@@ -22,7 +22,18 @@ from .experiment_rows import case_rows, experiment
 from .test_page import Page
 
 HOSTILE = "</td><script>alert(1)</script>&\"'{{x}}"
-FIGURES = ("success", "timelines", "roc", "kinds", "knowability", "scores", "time")
+FIGURES = (
+    "households",
+    "in-time",
+    "risk",
+    "success",
+    "timelines",
+    "roc",
+    "kinds",
+    "knowability",
+    "scores",
+    "time",
+)
 META: Mapping[str, Any] = {
     "title": "The experiments, test split",
     "split": "test",
@@ -52,6 +63,12 @@ def few_draws() -> Any:
 def whole() -> tuple[tuple[EpisodeRow, ...], dict[str, Any]]:
     rows = tuple(experiment(each=6))
     return rows, summary(rows, {})
+
+
+def content() -> dict[str, Any]:
+    """What the only household says."""
+    found: dict[str, Any] = whole()[1]["profiles"]["kind"]
+    return found
 
 
 def write(
@@ -87,7 +104,7 @@ def test_the_page_says_what_was_run(written: tuple[Path, Page, str]) -> None:
 
 def test_every_ordering_is_there_with_its_verdict(written: tuple[Path, Page, str]) -> None:
     _, page, _ = written
-    found = whole()[1]["orderings"]
+    found = content()["orderings"]
     assert len({o["verdict"] for o in found}) > 1
     for ordering in found:
         assert ordering["sentence"] in page.words
@@ -97,7 +114,7 @@ def test_ours_stands_beside_the_paper_with_interval_and_false_alarms(
     written: tuple[Path, Page, str],
 ) -> None:
     _, page, _ = written
-    line = next(p for p in whole()[1]["paper"] if p["what"] == "detection, full score")
+    line = next(p for p in content()["paper"] if p["what"] == "detection, full score")
     ours, false = line["ours"], line["false_alarms"]["harmless"]
     start = page.words.index("detection, full score")
     cells = page.words[start : start + 10]
@@ -110,7 +127,7 @@ def test_ours_stands_beside_the_paper_with_interval_and_false_alarms(
 
 def test_what_was_not_measured_is_no_number(written: tuple[Path, Page, str]) -> None:
     _, page, _ = written
-    line = next(p for p in whole()[1]["paper"] if p["ours"]["value"] is None)
+    line = next(p for p in content()["paper"] if p["ours"]["value"] is None)
     start = page.words.index(line["what"])
     assert "not measured" in page.words[start : start + 5]
 
@@ -209,9 +226,13 @@ def test_an_episode_that_broke_off_is_told_from_a_failed_one(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("strategies", "missing"),
     [
-        ((), set(FIGURES)),
-        (("proactive",), {"timelines", "roc", "kinds", "knowability", "scores"}),
-        (("watch",), {"timelines"}),
+        ((), {*FIGURES, "demonstrations"}),
+        (
+            ("proactive",),
+            {"timelines", "roc", "kinds", "knowability", "scores"}
+            | {"in-time", "risk", "demonstrations"},
+        ),
+        (("watch",), {"timelines", "demonstrations"}),
     ],
 )
 def test_what_is_missing_is_said(
@@ -236,7 +257,7 @@ def test_a_figure_of_an_earlier_run_does_not_stay(tmp_path: Path) -> None:
 
 
 def test_operating_points_lie_where_the_summary_has_them() -> None:
-    _, made = whole()
+    made = content()
     panels = figure_data.roc(made, lambda name: name)
     assert [title for title, _ in panels] == ["detectors", "parts of the score"]
     curves = {c.label: c for c in panels[0][1]}
@@ -253,7 +274,7 @@ def test_operating_points_lie_where_the_summary_has_them() -> None:
 
 
 def test_alarms_in_time_late_and_early_add_up_to_the_detected() -> None:
-    _, made = whole()
+    made = content()
     for group, (_, shares) in zip(
         ("scene", "plan", "after"), figure_data.knowability(made, lambda n: n), strict=True
     ):

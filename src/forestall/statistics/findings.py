@@ -13,7 +13,6 @@ from forestall.statistics.cells import points, share
 from forestall.statistics.metrics import ALWAYS, TRUTH
 from forestall.statistics.outcomes import DETECTOR, NO_STRATEGY, ONLINE, PROACTIVE
 from forestall.statistics.paper import ABLATIONS
-from forestall.statistics.sentences import sentences
 from forestall.statistics.watches import PAPER_SET
 
 Summary = Mapping[str, Any]
@@ -28,9 +27,9 @@ WEAK = 0.7
 
 
 def findings(summary: Summary) -> list[str]:
-    """Sentences for the page: ten for a sceptical reader, then what the first household says."""
+    """Sentences for the page, of the household that is shown first; see also `sentences`."""
     content = {**summary["profiles"][summary["shown"]], "names": summary["names"]}
-    return sentences(summary) + [
+    return [
         sentence
         for part in (
             _alarms,

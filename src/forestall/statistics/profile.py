@@ -97,6 +97,7 @@ def content(rows: Sequence[EpisodeRow], profile: str, names: Names | None) -> di
         "paired_with_retry": _paired(setups, RETRY, profile),
         "shared": _shared(setups),
         "cost_of_false_alarms": _costs(setups),
+        "main_judges": [n for n in runs.names if not is_variant(n)],
         "detectors": by_set[main],
         "detectors_by_set": by_set,
         "curves": {of: curves_of(runs, of) for of in by_set},

@@ -1,6 +1,6 @@
 """Ten sentences that a sceptical reviewer would want, from the numbers of a summary.
 
-Called by `tables` and `findings`. Nothing is written by hand: whichever way numbers turn out, the
+Called by `tables`. Nothing is written by hand: whichever way numbers turn out, the
 sentence says so, and what was not measured is said to be.
 """
 
@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from forestall.statistics.cells import (
+    DASH,
     EMPTY,
     Table,
     area,
     points,
-    probability,
     seconds,
     share,
     shown,
@@ -39,57 +39,60 @@ from forestall.statistics.judges import (
     Together,
     plan_check,
 )
-from forestall.statistics.orderings import FAILS, HOLDS, UNDECIDED, UNMEASURED
+from forestall.statistics.orderings import ALPHA, FAILS, HOLDS, UNDECIDED, UNMEASURED
 from forestall.statistics.outcomes import NO_STRATEGY, PROACTIVE, RETRY
+from forestall.statistics.rows import HONEST, KIND
 from forestall.statistics.watches import ALL
 
 Content = Mapping[str, Any]
 Names = Mapping[str, str]
 
 NOTHING_SAID = "not measured"
+BOTH = (KIND, HONEST)
+STAYS = "* marks"
 
 
 def told(summary: Mapping[str, Any]) -> Table:
-    """The ten sentences as a table."""
-    rows = tuple((str(k + 1), text) for k, text in enumerate(sentences(summary)))
-    return Table("sentences", "Ten sentences for a sceptical reader", ("", "sentence"), rows)
-
-
-def sentences(summary: Mapping[str, Any]) -> list[str]:
-    """Ten, each of every household that was run, the one shown first before the other."""
-    names = summary["names"]
-    return [
-        f"{claim} "
-        + " ".join(
-            f"{profile.capitalize()}: {'; '.join(said(content, names)) or NOTHING_SAID}."
-            for profile, content in summary["profiles"].items()
+    """The ten sentences as a table, one column for each household."""
+    names, contents = summary["names"], summary["profiles"]
+    rows = tuple(
+        (
+            str(k),
+            claim,
+            *("; ".join(said(contents[p], names)) or DASH if p in contents else DASH for p in BOTH),
         )
-        for claim, said in _TOLD
-    ]
+        for k, (claim, said) in enumerate(_TOLD, 1)
+    )
+    return Table(
+        "sentences",
+        "What a sceptical reader asks",
+        ("", "question", *BOTH),
+        rows,
+        f"In brackets 95 % intervals. {STAYS} what Holm's correction for all of the topic leaves.",
+    )
 
 
 def _demonstrations(content: Content, names: Names) -> Iterator[str]:
-    for model in MODELS:
-        check = plan_check(model)
-        for judge in (PRIMARY, MINED):
-            pair = Together(judge, check, both=False).name
-            gain = _compared(content, ADDED, pair, check, IN_TIME)
-            cost = _compared(content, ADDED, pair, check, FALSE)
-            if gain is not None:
-                more = "" if cost is None else f" ({_points(cost)} of runs with a false alarm)"
-                yield f"{model} model, {judge}: {_points(gain)} in time{_after(gain)}{more}"
-        first, second = with_model(PROACTIVE, model), with_model(PLAN_CHECK, model)
-        acted = _compared(content, ADDED, first, second)
-        if acted is not None:
-            yield f"{first} over {second} in success: {_points(acted)}{_after(acted)}"
+    for judge in (PRIMARY, MINED):
+        pairs = {
+            model: (Together(judge, check, both=False).name, check)
+            for model in MODELS
+            for check in (plan_check(model),)
+        }
+        gains = _each(content, ADDED, pairs, IN_TIME)
+        if gains:
+            costs = _each(content, ADDED, pairs, FALSE)
+            yield f"{judge}, in time: {gains}; in runs with a false alarm: {costs}"
+    acted = {m: (with_model(PROACTIVE, m), with_model(PLAN_CHECK, m)) for m in MODELS}
+    if gains := _each(content, ADDED, acted):
+        yield f"{PROACTIVE} over {PLAN_CHECK}, in success: {gains}"
 
 
 def _model(content: Content, names: Names) -> Iterator[str]:
-    for model in MODELS:
-        for judge in (MINED, PRIMARY):
-            found = _compared(content, MODEL, plan_check(model), judge, IN_TIME)
-            if found is not None:
-                yield f"{model} model over {judge}: {_points(found)}{_after(found)}"
+    for judge in (MINED, PRIMARY):
+        pairs = {model: (plan_check(model), judge) for model in MODELS}
+        if gains := _each(content, MODEL, pairs, IN_TIME):
+            yield f"over {judge}: {gains}"
 
 
 def _identity(content: Content, names: Names) -> Iterator[str]:
@@ -115,7 +118,7 @@ def _literal(content: Content, names: Names) -> Iterator[str]:
     )
     found = _compared(content, LITERALLY, LITERAL, PRIMARY, "AUROC in time")
     if found is not None:
-        yield f"against the shipped reading {_points(found)} of area{_after(found)}"
+        yield f"area {_brief(found)} hundredths beside the shipped reading"
 
 
 def _orderings(content: Content, names: Names) -> Iterator[str]:
@@ -126,12 +129,11 @@ def _orderings(content: Content, names: Names) -> Iterator[str]:
     yield f"of {len(found)} " + ", ".join(
         f"{counts[v]} {words}" for v, words in _VERDICTS.items() if counts[v]
     )
+    pairs: dict[tuple[str, str], list[bool]] = {}
     for o in found:
-        if o["topic"] == "strategies":
-            yield f"{o['better']} over {o['worse']} {o['corrected']}"
-    held = [o for o in found if o["corrected"] == HOLDS and o["topic"] != "strategies"]
-    for o in held:
-        yield f"{shown(o['worse'], names)} is worse in {o['measure']}"
+        pairs.setdefault((o["better"], o["worse"]), []).append(o["corrected"] == HOLDS)
+    for (better, worse), held in pairs.items():
+        yield f"{shown(better, names)} over {shown(worse, names)} {sum(held)}/{len(held)}"
 
 
 _VERDICTS = {HOLDS: "hold", FAILS: "do not hold", UNDECIDED: "undecided"}
@@ -142,7 +144,7 @@ def _chance(content: Content, names: Names) -> Iterator[str]:
     for o in found:
         yield (
             f"{shown(o['better'], names)} {_percent(o['first'])} against {_percent(o['second'])}"
-            f"{_after(o)}"
+            f"{_star(o)}"
         )
 
 
@@ -154,7 +156,7 @@ def _retry(content: Content, names: Names) -> Iterator[str]:
     for name in (PROACTIVE, PLAN_CHECK):
         pair = _compared(content, AGAIN, name, RETRY)
         if pair is not None:
-            yield f"{name} minus {RETRY}, on all cases of both: {_points(pair)}{_after(pair)}"
+            yield f"{name} minus {RETRY}, on all cases of both: {_brief(pair)} points"
 
 
 def _cost(content: Content, names: Names) -> Iterator[str]:
@@ -185,19 +187,19 @@ Said = Callable[[Content, Names], Iterator[str]]
 
 _TOLD: tuple[tuple[str, Said], ...] = (
     (
-        "What demonstrations add to a model (asked beside the plan check, minus it alone).",
+        "What do demonstrations add to a model? Judge or plan check minus plan check, in points.",
         _demonstrations,
     ),
-    ("What the model adds to demonstrations, in detection in time.", _model),
-    ("What identity and kindness are worth to the score.", _identity),
-    ("What the paper's equations do, taken literally on the whole scene.", _literal),
-    ("Of the paper's orderings, after Holm's correction.", _orderings),
-    ("Detection in time against chance with as many false alarms per boundary.", _chance),
-    ("What merely trying again does, on the cases that all strategies share.", _retry),
-    ("What false alarms cost where nobody is needed, against no strategy.", _cost),
-    ("Failures that can only be known when the harm is done, which no monitor can foresee.",
+    ("What does the model add to demonstrations? Plan check minus judge in time, points.", _model),
+    ("What are identity and kindness worth to the score?", _identity),
+    ("What do the paper's equations do, taken literally on the whole scene?", _literal),
+    ("Which of the paper's orderings hold, after Holm's correction?", _orderings),
+    ("What would chance with as many false alarms per boundary detect in time?", _chance),
+    ("What does merely trying again reach, on the cases that all strategies share?", _retry),
+    ("What do false alarms cost where nobody is needed, against no strategy?", _cost),
+    ("How many failures can only be known when the harm is done?",
      _unforeseeable),
-    ("Boundaries at which nothing was judged.", _not_judged),
+    ("At how many boundaries was nothing judged?", _not_judged),
 )  # fmt: skip
 
 
@@ -215,16 +217,24 @@ def _compared(
     )
 
 
-def _points(found: Mapping[str, Any]) -> str:
-    return points(found["difference"])
+def _each(
+    content: Content, topic: str, pairs: Mapping[str, tuple[str, str]], measure: str = ""
+) -> str:
+    """What each pair gains, by model."""
+    found = {m: _compared(content, topic, *pair, measure) for m, pair in pairs.items()}
+    return ", ".join(f"{_brief(o)} ({model})" for model, o in found.items() if o is not None)
 
 
-def _after(found: Mapping[str, Any]) -> str:
-    """The p-value after Holm's correction."""
-    if found["p_holm"] is None:
-        return ""
-    said = probability(found["p_holm"])
-    return f", p after Holm {said if said.startswith('<') else '= ' + said}"
+def _brief(found: Mapping[str, Any]) -> str:
+    """A difference in points with its interval, marked if it stays after Holm's correction."""
+    metric = found["difference"]
+    low, high = metric["low"], metric["high"]
+    between = "" if low is None else f" [{100 * low:+.1f}, {100 * high:+.1f}]"
+    return f"{100 * metric['value']:+.1f}{between}{_star(found)}"
+
+
+def _star(found: Mapping[str, Any]) -> str:
+    return " *" if found["p_holm"] is not None and found["p_holm"] <= ALPHA else ""
 
 
 def _percent(value: float | None) -> str:

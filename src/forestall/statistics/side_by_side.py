@@ -10,14 +10,13 @@ from typing import Any
 
 from forestall.statistics.cells import DASH, Columns, Names, Table, cells, shown
 from forestall.statistics.further_tables import ACTED, FALSE_NOTE, JUDGED
-from forestall.statistics.judges import MINED, PRIMARY, is_variant
+from forestall.statistics.judges import MODELS, OTHERS, PRIMARY, Together, is_variant, plan_check
 from forestall.statistics.metrics import ALWAYS, NEVER, RANDOM
 from forestall.statistics.outcomes import SIMPLE
 from forestall.statistics.paper import ABLATIONS
-from forestall.statistics.rows import HONEST, KIND
+from forestall.statistics.rows import EXACT, HONEST, KIND
 
 COLUMNS = (KIND, HONEST)
-LEFT_OUT = {NEVER, RANDOM, *ABLATIONS.values()}
 
 
 def side_by_side(summary: Mapping[str, Any], names: Names) -> Table:
@@ -56,6 +55,17 @@ def _lines(
 
 
 def _told(name: str) -> bool:
-    """Whether it stands in this table: no other number of demonstrations, no part left out."""
-    asked_with_mined = name.startswith((f"{MINED} or ", f"{MINED} and "))
-    return not is_variant(name) and name not in LEFT_OUT and not asked_with_mined
+    """Whether it stands in this table; the others have one of their own."""
+    return not is_variant(name) and name not in LEFT_OUT
+
+
+def _further() -> Iterator[str]:
+    """Two judges that are asked together, but for the primary one and the exact model."""
+    for model in MODELS:
+        for judge in OTHERS:
+            if (judge, model) != (PRIMARY, EXACT):
+                for both in (False, True):
+                    yield Together(judge, plan_check(model), both).name
+
+
+LEFT_OUT = {NEVER, RANDOM, *ABLATIONS.values(), *_further()}

@@ -44,7 +44,7 @@ _SUFFIXES = (*(f"{t:.2f}" for t in THRESHOLDS), "mean")
 
 
 def tables(summary: Mapping[str, Any], names: Names | None = None) -> tuple[Table, ...]:
-    """Every table of a summary: both households side by side, then those of the one shown first.
+    """Every table of a summary: what both households say, then those of the one shown first.
 
     Args:
         summary: of `summary.summary`, or read from its file.
@@ -53,7 +53,7 @@ def tables(summary: Mapping[str, Any], names: Names | None = None) -> tuple[Tabl
     names = summary["names"] if names is None else names
     first = summary["shown"]
     notes = [f"{DASH}: not measured.", *(f"{n}." for n in summary["episodes"]["notes"])]
-    found = [side_by_side(summary, names), told(summary)]
+    found = [told(summary), side_by_side(summary, names)]
     for profile, content in summary["profiles"].items():
         made = of_profile(content, names)
         found += made if profile == first else [t.of(profile) for t in made]
