@@ -260,9 +260,9 @@ def _named(alarms: Alarms, bad: Bools) -> dict[str, Ratio]:
         facts = [f for n in alarms.names for f in of.judged[place].named.get(n, ())]
         agreement = cause_named(facts, causes)
         asked[run] = 1
-        named[run] = agreement is not Agreement.NONE
+        named[run] = agreement is not Agreement.NOTHING
         exact[run] = agreement is Agreement.EXACT
-        right[run] = agreement in (Agreement.EXACT, Agreement.SAME)
+        right[run] = agreement.right
     parts: Mapping[str, Floats] = {"exact": exact, "right": right, "named": named}
     return {f"cause_{name}": Ratio(values, asked) for name, values in parts.items()}
 

@@ -118,7 +118,7 @@ def _literal(content: Content, names: Names) -> Iterator[str]:
     )
     found = _compared(content, LITERALLY, LITERAL, PRIMARY, "AUROC in time")
     if found is not None:
-        yield f"area {_brief(found)} hundredths beside the shipped reading"
+        yield f"its area minus the shipped reading's, times 100: {_brief(found)}"
 
 
 def _orderings(content: Content, names: Names) -> Iterator[str]:
@@ -126,7 +126,7 @@ def _orderings(content: Content, names: Names) -> Iterator[str]:
     if not found:
         return
     counts = Counter(o["corrected"] for o in found)
-    yield f"of {len(found)} " + ", ".join(
+    yield f"of {len(found)}: " + ", ".join(
         f"{counts[v]} {words}" for v, words in _VERDICTS.items() if counts[v]
     )
     pairs: dict[tuple[str, str], list[bool]] = {}
