@@ -25,6 +25,7 @@ STRATEGIES = (
 LEARNING = ("scene-graph", "preconditions")
 
 Panel = tuple[str, tuple[Banded, ...]]
+Point = tuple[float, float, float | None, float | None]
 
 
 def in_time(summary: Summary, names: Names) -> tuple[Panel, ...]:
@@ -36,20 +37,17 @@ def risk(summary: Summary, names: Names) -> tuple[Panel, ...]:
     """Runs that fail without an alarm in time against alarms per hour."""
 
     def of(content: Summary) -> tuple[Banded, ...]:
-        curves = _of_set(content)
-        return tuple(
-            Banded(
-                names(judge),
-                tuple(
-                    (p["per_hour"], p["failed"], p["failed_low"], p["failed_high"])
-                    for p in curves[judge]["risk"]
-                    if p["per_hour"] is not None and p["failed"] is not None
-                ),
-                steps=True,
+        curves, found = _of_set(content), []
+        for judge in CHOSEN:
+            points = [p for p in curves.get(judge, {}).get("risk", ()) if _measured(p)]
+            line = tuple(
+                (p["per_hour"], p["failed"], p["failed_low"], p["failed_high"]) for p in points
             )
-            for judge in CHOSEN
-            if curves.get(judge, {}).get("risk")
-        )
+            if line:
+                at = 0.9 if judge.startswith(CHOSEN[0]) else 0.5
+                raised = [k for k, p in enumerate(points) if p["score"] is None or p["score"] < at]
+                found.append(_shown(names(judge), line, line[raised[-1]], _single(content, judge)))
+        return tuple(found)
 
     return _panels(summary, of)
 
@@ -113,15 +111,32 @@ def _curves(content: Summary, names: Names) -> tuple[Banded, ...]:
         if band := curves.get(judge, {}).get("band"):
             metrics = content["detectors"][judge]
             at = "@0.90" if "in_time@0.90" in metrics else ""
-            hit, false = (
-                metrics[f"{m}{at}"]["value"] for m in ("in_time", "false_alarms_per_run_all")
-            )
-            mark = None if hit is None or false is None else (false, hit)
-            points = tuple((p["at"], p["value"], p["low"], p["high"]) for p in band)
+            hit, false = (metrics[f"{m}{at}"] for m in ("in_time", "false_alarms_per_run_all"))
             area = metrics["auroc_in_time_all"]["value"]
             label = names(judge) + ("" if area is None else f"  (area {area:.2f})")
-            found.append(Banded(label, points, True, mark))
+            if hit["value"] is None or false["value"] is None:
+                continue
+            points = tuple((p["at"], p["value"], p["low"], p["high"]) for p in band)
+            mark = (false["value"], hit["value"], hit["low"], hit["high"])
+            found.append(_shown(label, points, mark, _single(content, judge)))
     return tuple(found)
+
+
+def _shown(label: str, points: tuple[Point, ...], mark: Point, single: bool) -> Banded:
+    """A line with the threshold in use, or that alone where a judge says yes or no."""
+    x, y, low, high = mark
+    if not single:
+        return Banded(label, points, steps=True, mark=(x, y))
+    span = None if low is None or high is None else (low, high)
+    return Banded(label, (), mark=(x, y), span=span)
+
+
+def _single(content: Summary, judge: str) -> bool:
+    return "in_time@0.90" not in content["detectors"][judge]
+
+
+def _measured(point: Mapping[str, Any]) -> bool:
+    return point["per_hour"] is not None and point["failed"] is not None
 
 
 def _of_set(content: Summary) -> Mapping[str, Any]:
@@ -129,9 +144,7 @@ def _of_set(content: Summary) -> Mapping[str, Any]:
     return found
 
 
-def _by_count(
-    points: Any, measure: str
-) -> tuple[tuple[float, float, float | None, float | None], ...]:
+def _by_count(points: Any, measure: str) -> tuple[Point, ...]:
     return tuple(
         (float(p["demonstrations"]), m["value"], m["low"], m["high"])
         for p in points

@@ -26,8 +26,8 @@ from forestall.report.figure_values import Banded
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_PER_HOUR = 60.0
-"""False alarms per hour beyond which no curve is shown: one a minute."""
+MOST_PER_HOUR = 30.0
+"""False alarms per hour up to which curves are shown, or farther where a threshold in use lies."""
 
 
 def in_time(panels: Sequence[tuple[str, Sequence[Banded]]]) -> bytes:
@@ -35,7 +35,7 @@ def in_time(panels: Sequence[tuple[str, Sequence[Banded]]]) -> bytes:
     count = max(1, len(panels))
     with styled():
         most = max((len(lines) for _, lines in panels), default=0)
-        figure = new_figure(WIDE / 2 if count == 1 else WIDE, 560 + 18 * most)
+        figure = new_figure(WIDE / 2 if count == 1 else WIDE, 520 + 18 * most)
         grid = figure.subplots(1, count, squeeze=False)[0]
         for axes, (title, lines) in zip(grid, panels, strict=False):
             axes.set_title(title)
@@ -63,7 +63,8 @@ def risk(panels: Sequence[tuple[str, Sequence[Banded]]]) -> bytes:
             axes.set_title(title)
             for index, line in enumerate(lines):
                 _line(axes, line, index)
-            axes.set_xlim(-0.5, MOST_PER_HOUR)
+            marks = [line.mark[0] for line in lines if line.mark is not None]
+            axes.set_xlim(-0.02 * MOST_PER_HOUR, max([MOST_PER_HOUR, *(1.1 * x for x in marks)]))
             axes.set_ylim(bottom=0)
             axes.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
             axes.set_xlabel("false alarms per hour of robot time")
@@ -97,17 +98,17 @@ def demonstrations(panels: Sequence[tuple[str, str, Sequence[Banded]]]) -> bytes
 
 def _line(axes: Axes, line: Banded, index: int, marked: bool = False) -> None:
     shade = series_colour(index)
-    x = [p[0] for p in line.points]
-    axes.plot(
-        *(x, [p[1] for p in line.points]),
-        color=shade,
-        linewidth=2.8 if index == 0 else 1.8,
-        linestyle=DASHES[index % len(DASHES)],
-        drawstyle="steps-post" if line.steps else "default",
-        marker=MARKERS[index % len(MARKERS)] if marked else NOTHING,
-        label=line.label,
-        zorder=3 - 0.1 * index,
-    )
+    if line.points:
+        axes.plot(
+            *([p[0] for p in line.points], [p[1] for p in line.points]),
+            color=shade,
+            linewidth=2.8 if index == 0 else 1.8,
+            linestyle=DASHES[index % len(DASHES)],
+            drawstyle="steps-post" if line.steps else "default",
+            marker=MARKERS[index % len(MARKERS)] if marked else NOTHING,
+            label=line.label,
+            zorder=3 - 0.1 * index,
+        )
     band = [
         (a, low, high) for a, _, low, high in line.points if low is not None and high is not None
     ]
@@ -122,6 +123,9 @@ def _line(axes: Axes, line: Banded, index: int, marked: bool = False) -> None:
             linewidth=0,
             zorder=1,
         )
+    if line.mark is not None and line.span is not None:
+        x = line.mark[0]
+        axes.plot([x, x], line.span, color=shade, linewidth=2, alpha=0.6, zorder=4)
     if line.mark is not None:
         axes.plot(
             *([line.mark[0]], [line.mark[1]]),
@@ -130,6 +134,7 @@ def _line(axes: Axes, line: Banded, index: int, marked: bool = False) -> None:
             markersize=9,
             markeredgecolor=colour("card"),
             linestyle=NOTHING,
+            label="" if line.points else line.label,
             clip_on=False,
             zorder=5,
         )
