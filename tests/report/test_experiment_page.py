@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from forestall.report import figure_data
+from forestall.report import figure_data, figure_households
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics import intervals
+from forestall.statistics.cells import DASH
 from forestall.statistics.rows import EpisodeRow
 from forestall.statistics.summary import summary
 from forestall.statistics.tables import tables
 
 from .experiment_rows import case_rows, experiment
+from .household_rows import both
 from .test_page import Page
 
 HOSTILE = "</td><script>alert(1)</script>&\"'{{x}}"
@@ -247,6 +249,55 @@ def test_what_is_missing_is_said(
     assert sum(w.startswith("Missing: ") for w in page.words) == len(missing)
     if not rows:
         assert "No episode was run." in page.words
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, dict[str, Any]]:
+    rows = both(scenarios=2, rooms=2, acted=1)
+    made = summary(rows, {})
+    folder = tmp_path_factory.mktemp("two")
+    return folder, write(folder, rows, made)[0], made
+
+
+def test_two_households_stand_side_by_side(two: tuple[Path, Page, dict[str, Any]]) -> None:
+    folder, page, made = two
+    asked, beside = tables(made)[:2]
+    assert (asked.name, beside.name) == ("sentences", "side-by-side")
+    assert [row[0] for row in asked.rows] == [str(k) for k in range(1, 11)]
+    assert DASH not in {c for row in asked.rows for c in row}, "all ten are measured in both"
+    first = page.words.index(asked.title)
+    assert first < page.words.index(beside.title) < page.words.index("What was run")
+    for cell in (c for row in (*asked.rows, *beside.rows) for c in row):
+        assert cell in page.words
+    assert {p.stem for p in (folder / "figures").glob("*")} == {*FIGURES, "demonstrations"}
+    for path in (folder / "figures").glob("*.svg"):
+        ET.parse(path)
+
+
+def test_figures_show_what_the_summary_holds(two: tuple[Path, Page, dict[str, Any]]) -> None:
+    contents = two[2]["profiles"]
+    panels = dict(figure_households.in_time(two[2], lambda n: n))
+    assert list(panels) == ["kind", "honest"]
+    for profile, lines in panels.items():
+        score = next(x for x in lines if x.label.startswith("scene-graph  (area"))
+        own = contents[profile]["detectors"]["scene-graph"]
+        marked = (own[m]["value"] for m in ("false_alarms_per_run_all@0.90", "in_time@0.90"))
+        assert score.mark == tuple(marked)
+        check = next(x for x in lines if x.label.startswith("plan-check  (area"))
+        hit = contents[profile]["detectors"]["plan-check"]["in_time"]
+        assert check.points == () and check.span == (hit["low"], hit["high"])
+    for profile, lines in figure_households.risk(two[2], lambda n: n):
+        found = contents[profile]["detectors"]
+        false = {x.label: x.mark and x.mark[0] for x in lines}
+        for judge in ("scene-graph", "plan-check", "scene-graph or plan-check"):
+            end = "@0.90" if judge == "scene-graph" else ""
+            assert false[judge] == pytest.approx(
+                found[judge][f"false_alarms_per_hour_all{end}"]["value"]
+            )
+    known = {title for title, _, _ in figure_households.demonstrations(two[2], lambda n: n)}
+    assert known == {"kind", "honest"}
+    (_, dots), (_, others) = figure_households.strategies(two[2], lambda n: n)
+    assert [d.label for d in dots] == [d.label for d in others]
 
 
 def test_a_figure_of_an_earlier_run_does_not_stay(tmp_path: Path) -> None:

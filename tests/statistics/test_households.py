@@ -175,7 +175,8 @@ def test_chance_has_as_many_false_alarms_per_boundary() -> None:
 def test_a_cause_is_named_right_at_the_first_alarm_in_time() -> None:
     def run(k: int, first: str, second: str, causes: tuple[str, ...]) -> EpisodeRow:
         moments = seen(0.5, 0.5, 0.5)
-        named = [{}, {"scene-graph": (first,) if first else ()}, {"scene-graph": (second,)}]
+        facts: list[tuple[str, ...]] = [(), (first,) if first else (), (second,)]
+        named = [{"scene-graph": f} for f in facts]
         told = tuple(replace(j, named=n) for j, n in zip(moments, named, strict=True))
         return failing(k, judged=told, causes=causes)
 
