@@ -96,7 +96,7 @@ def curves_of(of: Watches, failing: str) -> dict[str, dict[str, Any]]:
     for judge in [*judges, *together(of.names)]:
         line = Line.by(of, judge)
         found[judge if isinstance(judge, str) else judge.name] = {
-            **{n: roc(line, n, failing, False) for n in NEGATIVES},
+            ALL: roc(line, ALL, failing, False),
             "in_time": roc(line, ALL, failing, True),
             "band": roc_band(line, failing),
             "risk": risk(line),
