@@ -61,7 +61,7 @@ def test_what_was_asked_for_and_is_not_there_is_said(tmp_path: Path) -> None:
     lines = (tmp_path / ROWS).read_text().splitlines(keepends=True)
     (tmp_path / ROWS).write_text("".join(x for x in lines if '"strategy": "online"' not in x))
     data, tables = present(tmp_path)
-    assert "missing: 4 episodes of online on irreversible" in data["episodes"]["notes"]
+    assert "missing: 4 episodes of online on irreversible, kind" in data["episodes"]["notes"]
     assert all("missing: 4 episodes of online on irreversible" in t.note for t in tables)
 
 

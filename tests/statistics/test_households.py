@@ -24,7 +24,13 @@ from forestall.statistics.judgements import by_demonstrations, judgements
 from forestall.statistics.judges import Together, demonstrations_of, is_variant, together
 from forestall.statistics.metrics import asked_together, at_thresholds, point_metrics
 from forestall.statistics.orderings import ALPHA, HOLDS, UNDECIDED, Ordering, holm
-from forestall.statistics.outcomes import by_setup, false_alarm_cost, harm_prevented, shared_cases
+from forestall.statistics.outcomes import (
+    by_setup,
+    false_alarm_cost,
+    harm_prevented,
+    shared_cases,
+    time_between,
+)
 from forestall.statistics.pairs import paired
 from forestall.statistics.rooms import over_rooms
 from forestall.statistics.rows import HONEST, EpisodeRow, Judged
@@ -206,6 +212,8 @@ def test_a_false_alarm_costs_time_and_success_where_nobody_is_needed() -> None:
     assert (found["changed"].count, found["changed"].n) == (2, 4)
     assert (found["seconds_changed"].value, found["seconds_changed"].n) == (20.0, 2)
     assert found["success"].value == -0.25
+    between = time_between(setups["proactive"], setups["none"], ALL)
+    assert (between.value, between.n) == (8.0, 5)
 
 
 def test_harm_is_prevented_where_it_was_done_without() -> None:

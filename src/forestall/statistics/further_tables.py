@@ -114,6 +114,7 @@ def _with_retry(content: Content, names: Names) -> Table:
             probability(pair["success"]["p"]),
             probability(pair["success"]["p_clustered"]),
             points(pair["prevented"]),
+            seconds(pair["seconds"]),
         )
         for name, sets in content["paired_with_retry"].items()
         for of, pair in sets.items()
@@ -125,6 +126,7 @@ def _with_retry(content: Content, names: Names) -> Table:
         (
             *("set", "strategy", "success", "only this : only trying again", "McNemar's p"),
             *("p over rooms and scenarios", "nothing irreversible happened"),
+            "robot time",
         ),
         tuple(rows),
     )

@@ -162,6 +162,14 @@ def compared(
     )
 
 
+def time_between(first: Runs, second: Runs, of: str) -> Metric:
+    """Robot time of one strategy minus that of another on the cases that both were run on."""
+    both = [c for c in first if c in second and of in (ALL, c.set)]
+    kept = [c for c in both if ERROR not in _ends(first, second, c)]
+    more = [first[c].simulated_s - second[c].simulated_s for c in kept]
+    return mean(more, [unit_of(first[c]) for c in kept])
+
+
 def shared_cases(setups: Mapping[str, Runs]) -> frozenset[Case]:
     """Cases that every strategy of the paper, the plan check and the retry were run on.
 

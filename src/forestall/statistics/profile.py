@@ -45,6 +45,7 @@ from forestall.statistics.outcomes import (
     prevented,
     sets_of,
     shared_cases,
+    time_between,
 )
 from forestall.statistics.paper import comparison
 from forestall.statistics.rooms import over_rooms
@@ -154,6 +155,7 @@ def _paired(setups: Mapping[str, Runs], base: str, profile: str) -> dict[str, di
             of: {
                 "success": compared(runs, second, of).to_json(),
                 "prevented": compared(runs, second, of, prevented).to_json(),
+                "seconds": time_between(runs, second, of),
             }
             for of in _sets(runs, profile)
         }
