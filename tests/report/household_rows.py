@@ -157,7 +157,8 @@ def _judged(
     for judge, score in scores.items():
         if score is not None and score < (0.5 if judge in YES_NO else 0.9):
             right = bad and causes and rng.random() < 0.6
-            named[judge] = causes if right else ("on(Mug-1, Table-1)",)
+            wanted = tuple(c.replace("wine", "water") for c in causes)
+            named[judge] = wanted if right else ("open(Fridge-1)",)
     return Judged(
         index=index,
         when="before",

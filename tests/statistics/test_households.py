@@ -212,6 +212,8 @@ def test_a_false_alarm_costs_time_and_success_where_nobody_is_needed() -> None:
     assert (found["changed"].count, found["changed"].n) == (2, 4)
     assert (found["seconds_changed"].value, found["seconds_changed"].n) == (20.0, 2)
     assert found["success"].value == -0.25
+    same = false_alarm_cost(setups["none"], setups["none"], setups["none"])["success"]
+    assert (same.low, same.value, same.high) == (0.0, 0.0, 0.0), "a difference, and no share"
     between = time_between(setups["proactive"], setups["none"], ALL)
     assert (between.value, between.n) == (8.0, 5)
 

@@ -152,12 +152,14 @@ class Ratio:
         above: (runs,) what is counted. `below`: (runs,) of what.
         n: what is reported as count; the sum of `below` by default.
         whole: whether what is counted are things and not means of several.
+        free: whether it can be any number, and is no share.
     """
 
     above: Floats
     below: Floats
     n: int | None = None
     whole: bool = True
+    free: bool = False
 
     @property
     def share(self) -> bool:
@@ -231,7 +233,7 @@ def _of_ratio(ratio: Ratio, value: float, band: Band, clusters: Clusters) -> Met
     rooms = clusters.rooms_in(where)
     if rooms < 2 or band is None:
         return Metric(value, None, None, n, NONE, count)
-    if band[0] == band[1] and ratio.n is None and value in (0.0, 1.0):
+    if band[0] == band[1] and not ratio.free and ratio.n is None and value in (0.0, 1.0):
         return Metric(value, *_clopper_pearson(round(value * rooms), rooms), n, EXACT, count)
     return Metric(value, *band, n, clusters.method, count)
 
@@ -322,7 +324,7 @@ def divided(above: Floats, below: Floats) -> Floats:
 
 def of_runs(values: Sequence[float], whole: bool = True) -> Ratio:
     """One value of each run, and every run once."""
-    return Ratio(np.asarray(values, float), np.ones(len(values)), whole=whole)
+    return Ratio(np.asarray(values, float), np.ones(len(values)), whole=whole, free=not whole)
 
 
 def _numbered(values: Sequence[Hashable | None]) -> Ints:

@@ -209,10 +209,10 @@ def false_alarm_cost(runs: Runs, base: Runs, calm: Runs) -> dict[str, Metric]:
     changed = np.array([runs[c].replans > 0 for c in there], float)
     one = np.ones(len(there))
     ratios = {
-        "seconds": Ratio(more, one, whole=False),
-        "success": Ratio(gain, one, whole=False),
+        "seconds": Ratio(more, one, whole=False, free=True),
+        "success": Ratio(gain, one, whole=False, free=True),
         "changed": Ratio(changed, one),
-        "seconds_changed": Ratio(more * changed, changed, whole=False),
+        "seconds_changed": Ratio(more * changed, changed, whole=False, free=True),
     }
     return measured(ratios, Clusters.of([unit_of(runs[c]) for c in there]))
 
@@ -269,7 +269,7 @@ def _ratio(
     whole: bool,
 ) -> Ratio:
     values = np.array([float(what(r)) for r in runs], float)
-    return Ratio(values * where, where.astype(float), whole=whole)
+    return Ratio(values * where, where.astype(float), whole=whole, free=not whole)
 
 
 def _case(item: tuple[Case, EpisodeRow]) -> tuple[str, str, str, int]:

@@ -10,8 +10,18 @@ from typing import Any
 
 from forestall.statistics.cells import DASH, Columns, Names, Table, cells, shown
 from forestall.statistics.further_tables import ACTED, FALSE_NOTE, JUDGED
-from forestall.statistics.judges import MODELS, OTHERS, PRIMARY, Together, is_variant, plan_check
-from forestall.statistics.metrics import ALWAYS, NEVER, RANDOM
+from forestall.statistics.judges import (
+    LITERAL,
+    MINED,
+    MODELS,
+    OTHERS,
+    PLAN_CHECK,
+    PRIMARY,
+    Together,
+    is_variant,
+    plan_check,
+)
+from forestall.statistics.metrics import ALWAYS, NEVER, RANDOM, TRUTH
 from forestall.statistics.outcomes import SIMPLE
 from forestall.statistics.paper import ABLATIONS
 from forestall.statistics.rows import EXACT, HONEST, KIND
@@ -27,7 +37,7 @@ def side_by_side(summary: Mapping[str, Any], names: Names) -> Table:
     known = {n for c in there for n in c["shared"]["strategies"]}
     acted = [s for s in (*SIMPLE, *sorted(known - set(SIMPLE))) if s in known]
     rows: list[tuple[str, ...]] = []
-    for name in sorted(judges, key=lambda n: (n != PRIMARY, n == ALWAYS)):
+    for name in sorted(judges, key=_place):
         found = [c and c["detectors"].get(name) for c in contents.values()]
         rows += _lines(shown(name, names), found, JUDGED)
     for name in acted:
@@ -57,6 +67,14 @@ def _lines(
 def _told(name: str) -> bool:
     """Whether it stands in this table; the others have one of their own."""
     return not is_variant(name) and name not in LEFT_OUT
+
+
+def _place(name: str) -> int:
+    """Judges in question first, those that cost nothing last."""
+    if name in (ALWAYS, TRUTH):
+        return 9
+    known = (PRIMARY, LITERAL, MINED)
+    return known.index(name) if name in known else 4 - name.startswith(PLAN_CHECK)
 
 
 def _further() -> Iterator[str]:
