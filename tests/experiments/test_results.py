@@ -47,10 +47,10 @@ def test_tables_do_not_depend_on_how_many_worked(tmp_path: Path) -> None:
     for file in files:
         assert (one / file).read_bytes() == (three / file).read_bytes(), file
     data = json.loads((one / SUMMARY).read_text())
-    assert {"value", "low", "high", "n"} <= data["strategies"]["proactive"]["robofail"][
-        "success"
-    ].keys()
-    assert "fdr@0.90" in data["detectors"]["scene-graph"]
+    found = data["profiles"][data["shown"]]
+    metric = found["strategies"]["proactive"]["robofail"]["success"]
+    assert {"value", "low", "high", "n"} <= metric.keys()
+    assert "fdr@0.90" in found["detectors"]["scene-graph"]
     page = (one / "index.html").read_text()
     assert "stand-in" in page and "roc" in page
     assert "asked for: 4 of 100 cases of robofail" in page
@@ -61,7 +61,7 @@ def test_what_was_asked_for_and_is_not_there_is_said(tmp_path: Path) -> None:
     lines = (tmp_path / ROWS).read_text().splitlines(keepends=True)
     (tmp_path / ROWS).write_text("".join(x for x in lines if '"strategy": "online"' not in x))
     data, tables = present(tmp_path)
-    assert "missing: 4 episodes of online on irreversible" in data["episodes"]["notes"]
+    assert "missing: 4 episodes of online on irreversible, kind" in data["episodes"]["notes"]
     assert all("missing: 4 episodes of online on irreversible" in t.note for t in tables)
 
 

@@ -11,18 +11,31 @@ from typing import Any
 import numpy as np
 import pytest
 
-from forestall.report import figure_data
+from forestall.report import figure_data, figure_households
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics import intervals
+from forestall.statistics.cells import DASH
 from forestall.statistics.rows import EpisodeRow
 from forestall.statistics.summary import summary
 from forestall.statistics.tables import tables
 
 from .experiment_rows import case_rows, experiment
+from .household_rows import both
 from .test_page import Page
 
 HOSTILE = "</td><script>alert(1)</script>&\"'{{x}}"
-FIGURES = ("success", "timelines", "roc", "kinds", "knowability", "scores", "time")
+FIGURES = (
+    "households",
+    "in-time",
+    "risk",
+    "success",
+    "timelines",
+    "roc",
+    "kinds",
+    "knowability",
+    "scores",
+    "time",
+)
 META: Mapping[str, Any] = {
     "title": "The experiments, test split",
     "split": "test",
@@ -52,6 +65,12 @@ def few_draws() -> Any:
 def whole() -> tuple[tuple[EpisodeRow, ...], dict[str, Any]]:
     rows = tuple(experiment(each=6))
     return rows, summary(rows, {})
+
+
+def content() -> dict[str, Any]:
+    """What the only household says."""
+    found: dict[str, Any] = whole()[1]["profiles"]["kind"]
+    return found
 
 
 def write(
@@ -87,7 +106,7 @@ def test_the_page_says_what_was_run(written: tuple[Path, Page, str]) -> None:
 
 def test_every_ordering_is_there_with_its_verdict(written: tuple[Path, Page, str]) -> None:
     _, page, _ = written
-    found = whole()[1]["orderings"]
+    found = content()["orderings"]
     assert len({o["verdict"] for o in found}) > 1
     for ordering in found:
         assert ordering["sentence"] in page.words
@@ -97,7 +116,7 @@ def test_ours_stands_beside_the_paper_with_interval_and_false_alarms(
     written: tuple[Path, Page, str],
 ) -> None:
     _, page, _ = written
-    line = next(p for p in whole()[1]["paper"] if p["what"] == "detection, full score")
+    line = next(p for p in content()["paper"] if p["what"] == "detection, full score")
     ours, false = line["ours"], line["false_alarms"]["harmless"]
     start = page.words.index("detection, full score")
     cells = page.words[start : start + 10]
@@ -110,7 +129,7 @@ def test_ours_stands_beside_the_paper_with_interval_and_false_alarms(
 
 def test_what_was_not_measured_is_no_number(written: tuple[Path, Page, str]) -> None:
     _, page, _ = written
-    line = next(p for p in whole()[1]["paper"] if p["ours"]["value"] is None)
+    line = next(p for p in content()["paper"] if p["ours"]["value"] is None)
     start = page.words.index(line["what"])
     assert "not measured" in page.words[start : start + 5]
 
@@ -209,9 +228,13 @@ def test_an_episode_that_broke_off_is_told_from_a_failed_one(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("strategies", "missing"),
     [
-        ((), set(FIGURES)),
-        (("proactive",), {"timelines", "roc", "kinds", "knowability", "scores"}),
-        (("watch",), {"timelines"}),
+        ((), {*FIGURES, "demonstrations"}),
+        (
+            ("proactive",),
+            {"timelines", "roc", "kinds", "knowability", "scores"}
+            | {"in-time", "risk", "demonstrations"},
+        ),
+        (("watch",), {"timelines", "demonstrations"}),
     ],
 )
 def test_what_is_missing_is_said(
@@ -228,6 +251,55 @@ def test_what_is_missing_is_said(
         assert "No episode was run." in page.words
 
 
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, dict[str, Any]]:
+    rows = both(scenarios=2, rooms=2, acted=1)
+    made = summary(rows, {})
+    folder = tmp_path_factory.mktemp("two")
+    return folder, write(folder, rows, made)[0], made
+
+
+def test_two_households_stand_side_by_side(two: tuple[Path, Page, dict[str, Any]]) -> None:
+    folder, page, made = two
+    asked, beside = tables(made)[:2]
+    assert (asked.name, beside.name) == ("sentences", "side-by-side")
+    assert [row[0] for row in asked.rows] == [str(k) for k in range(1, 11)]
+    assert DASH not in {c for row in asked.rows for c in row}, "all ten are measured in both"
+    first = page.words.index(asked.title)
+    assert first < page.words.index(beside.title) < page.words.index("What was run")
+    for cell in (c for row in (*asked.rows, *beside.rows) for c in row):
+        assert cell in page.words
+    assert {p.stem for p in (folder / "figures").glob("*")} == {*FIGURES, "demonstrations"}
+    for path in (folder / "figures").glob("*.svg"):
+        ET.parse(path)
+
+
+def test_figures_show_what_the_summary_holds(two: tuple[Path, Page, dict[str, Any]]) -> None:
+    contents = two[2]["profiles"]
+    panels = dict(figure_households.in_time(two[2], lambda n: n))
+    assert list(panels) == ["kind", "honest"]
+    for profile, lines in panels.items():
+        score = next(x for x in lines if x.label.startswith("scene-graph  (area"))
+        own = contents[profile]["detectors"]["scene-graph"]
+        marked = (own[m]["value"] for m in ("false_alarms_per_run_all@0.90", "in_time@0.90"))
+        assert score.mark == tuple(marked)
+        check = next(x for x in lines if x.label.startswith("plan-check  (area"))
+        hit = contents[profile]["detectors"]["plan-check"]["in_time"]
+        assert check.points == () and check.span == (hit["low"], hit["high"])
+    for profile, lines in figure_households.risk(two[2], lambda n: n):
+        found = contents[profile]["detectors"]
+        false = {x.label: x.mark and x.mark[0] for x in lines}
+        for judge in ("scene-graph", "plan-check", "scene-graph or plan-check"):
+            end = "@0.90" if judge == "scene-graph" else ""
+            assert false[judge] == pytest.approx(
+                found[judge][f"false_alarms_per_hour_all{end}"]["value"]
+            )
+    known = {title for title, _, _ in figure_households.demonstrations(two[2], lambda n: n)}
+    assert known == {"kind", "honest"}
+    (_, dots), (_, others) = figure_households.strategies(two[2], lambda n: n)
+    assert [d.label for d in dots] == [d.label for d in others]
+
+
 def test_a_figure_of_an_earlier_run_does_not_stay(tmp_path: Path) -> None:
     rows, made = whole()
     write(tmp_path, rows, made)
@@ -236,7 +308,7 @@ def test_a_figure_of_an_earlier_run_does_not_stay(tmp_path: Path) -> None:
 
 
 def test_operating_points_lie_where_the_summary_has_them() -> None:
-    _, made = whole()
+    made = content()
     panels = figure_data.roc(made, lambda name: name)
     assert [title for title, _ in panels] == ["detectors", "parts of the score"]
     curves = {c.label: c for c in panels[0][1]}
@@ -253,7 +325,7 @@ def test_operating_points_lie_where_the_summary_has_them() -> None:
 
 
 def test_alarms_in_time_late_and_early_add_up_to_the_detected() -> None:
-    _, made = whole()
+    made = content()
     for group, (_, shares) in zip(
         ("scene", "plan", "after"), figure_data.knowability(made, lambda n: n), strict=True
     ):

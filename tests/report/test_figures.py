@@ -8,9 +8,10 @@ from dataclasses import replace
 import matplotlib as mpl
 import pytest
 
-from forestall.report import figures, run_figures
+from forestall.report import figures, household_figures, run_figures
 from forestall.report.figure_style import COLOURS, inline_svg
 from forestall.report.figure_values import (
+    Banded,
     Curve,
     Distribution,
     Dot,
@@ -28,6 +29,9 @@ NONE = Estimate(None)
 CURVE = Curve(HOSTILE, ((0.0, 0.0), (0.1, 0.6), (1.0, 1.0)), ((0.9, 0.1, 0.6),), 0.75)
 LANE = Lane(HOSTILE, (0.0, 10.0, 20.0), (10.0,), (10.0,), 5.0, 25.0, 30.0, False)
 
+BAND = Banded(HOSTILE, ((1.0, 0.2, 0.1, 0.3), (2.0, 0.4, None, None)), True, (1.0, 0.2))
+POINT = Banded("b", (), mark=(0.1, 0.8), span=(0.6, 0.9))
+
 FULL: dict[str, Callable[[], bytes]] = {
     "roc": lambda: figures.roc([("a", [CURVE, Curve("always", ((1.0, 1.0),), single=True)])]),
     "dots": lambda: run_figures.dots([("a", [Dot(HOSTILE, SOME, 0.7), Dot("b", NONE)])], "success"),
@@ -38,6 +42,9 @@ FULL: dict[str, Callable[[], bytes]] = {
         [Distribution(HOSTILE, (("failing", (0.5, 0.6)), ("harmless", ())), 0.9)]
     ),
     "time_spent": lambda: run_figures.time_spent([Spent(HOSTILE, 100.0, 3.0, 5, 109.2)]),
+    "in_time": lambda: household_figures.in_time([("a", [BAND, POINT])]),
+    "risk": lambda: household_figures.risk([("a", [BAND, POINT]), ("b", [POINT])]),
+    "demonstrations": lambda: household_figures.demonstrations([("a", "b", [BAND])]),
 }
 EMPTY: dict[str, Callable[[], bytes]] = {
     "roc": lambda: figures.roc([]),
@@ -47,6 +54,9 @@ EMPTY: dict[str, Callable[[], bytes]] = {
     "timelines": lambda: run_figures.timelines([]),
     "scores": lambda: figures.scores([]),
     "time_spent": lambda: run_figures.time_spent([]),
+    "in_time": lambda: household_figures.in_time([]),
+    "risk": lambda: household_figures.risk([]),
+    "demonstrations": lambda: household_figures.demonstrations([]),
 }
 
 

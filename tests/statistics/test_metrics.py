@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from rows_by_hand import failing, good, judged, seen
 
 from forestall.errors import InputError
-from forestall.statistics.intervals import Metric, bootstrap, mean, paired, proportion, rate
+from forestall.statistics.intervals import Metric, bootstrap, mean, proportion, rate
 from forestall.statistics.metrics import (
     ALWAYS,
     NEVER,
@@ -15,13 +15,12 @@ from forestall.statistics.metrics import (
     TRUTH,
     at_thresholds,
     by_rule,
-    canonical,
     confirmed,
-    detectors,
     point_metrics,
     trivial,
-    watched,
 )
+from forestall.statistics.pairs import paired
+from forestall.statistics.watches import Watches, canonical
 
 
 def test_exact_interval_of_a_known_proportion() -> None:
@@ -85,7 +84,7 @@ def test_detection_is_counted_as_the_paper_does_and_as_it_should_be() -> None:
         failing(3, judged=seen(0.95, None, None, 0.95)),  # never
         failing(4, judged=seen(0.5, 0.9, 0.95, 0.95), known=4, effect=2),  # not foreseeable
     ]
-    found = point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))
+    found = point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))
     counted = {m: (found[m].count, found[m].n) for m in ("fdr", "in_time", "after_known")}
     assert counted == {"fdr": (4, 5), "in_time": (1, 4), "after_known": (2, 5)}
     early = found["early_alarms_per_boundary"]
@@ -96,7 +95,7 @@ def test_detection_is_counted_as_the_paper_does_and_as_it_should_be() -> None:
 
 def test_harm_after_the_last_step_is_led_until_the_end_of_the_run() -> None:
     row = failing(0, judged=seen(0.95, 0.95, 0.5, 0.95), effect=4, simulated_s=47.0)
-    found = point_metrics(at_thresholds([row], "scene-graph", (0.9,)))
+    found = point_metrics(at_thresholds(Watches.of([row]), "scene-graph", (0.9,)))
     assert (found["lead_subtasks"].value, found["lead_s"].value) == (2.0, 27.0)
 
 
@@ -107,14 +106,19 @@ def test_false_alarms_are_counted_by_run_and_by_boundary_apart() -> None:
         good(0, of="harmless", judged=seen(0.95, 0.95, 0.95, 0.5)),
         failing(0, judged=seen(0.95, 0.5, 0.95, 0.95)),
     ]
-    found = point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))
+    found = point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))
     counted = {m: (v.count, v.n) for m, v in found.items() if m.startswith("false")}
+    hours = {m: found[m].value for m in list(counted) if "_per_hour_" in m and counted.pop(m)}
     assert counted == {
         "false_alarms_per_boundary_undisturbed": (2, 8),
         "false_alarms_per_run_undisturbed": (1, 2),
         "false_alarms_per_boundary_harmless": (1, 4),
         "false_alarms_per_run_harmless": (1, 1),
+        "false_alarms_per_boundary_all": (3, 12),
+        "false_alarms_per_run_all": (2, 3),
     }
+    assert hours["false_alarms_per_hour_undisturbed"] == pytest.approx(2 / (200 / 3600))
+    assert hours["false_alarms_per_hour_all"] == pytest.approx(3 / (300 / 3600))
     assert found["balanced_accuracy_undisturbed"].value == pytest.approx(0.75)
     assert found["balanced_accuracy_all"].value == pytest.approx((1 + 1 / 3) / 2)
 
@@ -125,18 +129,18 @@ def test_a_failing_run_is_told_apart_from_its_twin_by_an_alarm_that_the_twin_has
         *(failing(k, judged=j) for k, j in enumerate((alarmed, alarmed, calm, alarmed))),
         *(good(k, judged=j) for k, j in enumerate((calm, alarmed, calm))),
     ]
-    found = point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))["pairs_apart"]
+    found = point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))["pairs_apart"]
     assert (found.count, found.n) == (1, 3)  # the fourth has no twin
 
 
 def test_a_score_at_the_threshold_is_no_alarm() -> None:
     rows = [failing(0, judged=seen(0.9, 0.9))]
-    assert point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))["fdr"].count == 0
+    assert point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))["fdr"].count == 0
 
 
 def test_mean_over_thresholds() -> None:
     rows = [failing(0, judged=seen(0.87, 0.95)), failing(1, judged=seen(0.7, 0.95))]
-    found = point_metrics(at_thresholds(rows, "scene-graph", (0.9, 0.85, 0.8)))["fdr"]
+    found = point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9, 0.85, 0.8)))["fdr"]
     assert found.value == pytest.approx((1 / 3 + 1) / 2)
     assert (found.n, found.count) == (2, None)
 
@@ -144,8 +148,8 @@ def test_mean_over_thresholds() -> None:
 def test_trivial_detectors() -> None:
     bad = failing(0, judged=tuple(replace(j, reachable=j.index < 1) for j in seen(0.9, 0.5, 0.9)))
     rows = [bad] + [good(k, judged=seen(0.95, 0.95, 0.5)) for k in range(30)]
-    own = at_thresholds(rows, "scene-graph", (0.9,))
-    found = {name: point_metrics(alarms) for name, alarms in trivial(rows, own).items()}
+    own = at_thresholds(Watches.of(rows), "scene-graph", (0.9,))
+    found = {name: point_metrics(alarms) for name, alarms in trivial(own.of, own).items()}
     per_run = "false_alarms_per_run_undisturbed"
     assert (found[ALWAYS]["fdr"].value, found[ALWAYS][per_run].value) == (1.0, 1.0)
     assert found[ALWAYS]["balanced_accuracy_all"].value == 0.5
@@ -163,15 +167,15 @@ def test_an_alarm_that_the_reasoner_does_not_confirm_is_none() -> None:
         failing(0, judged=(replace(alarm[0], confirmed=True), alarm[1])),
         failing(1, judged=tuple(alarm)),
     ]
-    assert point_metrics(by_rule(rows, confirmed))["fdr"].count == 1
+    assert point_metrics(by_rule(Watches.of(rows), confirmed))["fdr"].count == 1
 
 
 def test_a_detector_is_measured_on_the_runs_that_it_watched() -> None:
     both = judged({"scene-graph": [0.5], "image": [0.99]})
     rows = [failing(0, judged=both), failing(1, judged=seen(0.5)), failing(2, end="error")]
-    assert detectors(rows) == ("image", "scene-graph")
-    assert point_metrics(at_thresholds(rows, "image", (0.9,)))["fdr"].n == 2
-    found = point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))["fdr"]
+    assert Watches.of(rows).names == ("image", "scene-graph")
+    assert point_metrics(at_thresholds(Watches.of(rows), "image", (0.9,)))["fdr"].n == 2
+    found = point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))["fdr"]
     assert (found.count, found.n) == (2, 3), "a run that broke off counts as undetected"
 
 
@@ -179,13 +183,13 @@ def test_an_episode_counts_once() -> None:
     with pytest.raises(InputError, match="same episode"):
         canonical([failing(0), failing(0)])
     with pytest.raises(InputError, match="one case"):
-        watched([failing(0), failing(0, threshold=0.8)])
+        Watches.of([failing(0), failing(0, threshold=0.8)])
 
 
 def test_a_failing_run_must_say_when_it_can_be_known() -> None:
     rows = [failing(0, known=None, effect=None, judged=seen(0.5))]
     with pytest.raises(InputError, match="can be known"):
-        point_metrics(at_thresholds(rows, "scene-graph", (0.9,)))
+        point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))
 
 
 @settings(max_examples=30, deadline=None)

@@ -8,7 +8,7 @@ from forestall.statistics.orderings import (
     UNDECIDED,
     UNMEASURED,
     Ordering,
-    detectors_differ,
+    judges_differ,
     orderings,
     rates_differ,
     strategies_differ,
@@ -21,6 +21,7 @@ from forestall.statistics.outcomes import (
     prevented,
 )
 from forestall.statistics.rows import EpisodeRow
+from forestall.statistics.watches import Watches
 
 
 def irreversible(strategy: str, successes: int, n: int = 20) -> list[EpisodeRow]:
@@ -111,7 +112,9 @@ def test_an_ordering_holds_fails_or_is_open() -> None:
         + irreversible("post-hoc", 6)
         + irreversible("none", 5)
     )
-    found = {(o.better, o.worse): o for o in orderings(setups, []) if o.topic == "strategies"}
+    found = {
+        (o.better, o.worse): o for o in orderings(setups, Watches.of([])) if o.topic == "strategies"
+    }
     assert [o.verdict for o in found.values()] == [HOLDS, FAILS, UNDECIDED]
     assert (
         found["proactive", "online"]
@@ -134,7 +137,7 @@ def test_few_runs_decide_nothing() -> None:
 
 
 def test_what_was_not_run_is_not_measured() -> None:
-    found = orderings(by_setup(irreversible("proactive", 4)), [])
+    found = orderings(by_setup(irreversible("proactive", 4)), Watches.of([]))
     assert {o.verdict for o in found} == {UNMEASURED}
     assert {o.topic for o in found} == {"strategies", "detectors", "ablations", "reasoning"}
     assert all(o.sentence().endswith(": not measured.") for o in found)
@@ -144,12 +147,13 @@ def test_detecting_more_by_alarming_more_is_not_better() -> None:
     always, sharp = "image", "scene-graph"
     rows = [failing(k, judged=judged({sharp: [0.95, 0.7], always: [0.8, 0.8]})) for k in range(20)]
     rows += [good(k, judged=judged({sharp: [0.95, 0.95], always: [0.8, 0.8]})) for k in range(20)]
-    as_paper = rates_differ("detectors", rows, always, sharp, (0.9, 0.85, 0.8))
+    watched = Watches.of(rows)
+    as_paper = rates_differ("detectors", watched, always, sharp, (0.9, 0.85, 0.8))
     assert as_paper.first == pytest.approx(2 / 3)
     assert as_paper.second == 1.0
-    equal = detectors_differ("detectors", rows, sharp, always, "detection at 5 % false alarms")
+    equal = judges_differ("detectors", watched, sharp, always, "detection at 5 % false alarms")
     assert (equal.first, equal.second, equal.verdict) == (1.0, 0.0, HOLDS)
-    area = detectors_differ("detectors", rows, sharp, always, "AUROC")
+    area = judges_differ("detectors", watched, sharp, always, "AUROC")
     assert (area.first, area.second) == (1.0, 0.5)
 
 

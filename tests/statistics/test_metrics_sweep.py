@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,17 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows_by_hand import failing, good, judged, seen
 
+from forestall.statistics.curves import roc_points
+from forestall.statistics.intervals import Clusters
+from forestall.statistics.rows import Judged
 from forestall.statistics.sweep import (
+    Line,
     Sample,
     auroc,
     average_precision,
+    boundary_area,
     detected_at,
     detection_at,
     measured,
-    roc_points,
     sample,
     sweep_metrics,
 )
+from forestall.statistics.watches import ALL, Watches
 
 scores = st.one_of(st.sampled_from([0.1, 0.5, 0.7, 0.9, math.inf]), st.floats(0, 1))
 groups = st.tuples(
@@ -26,8 +32,9 @@ groups = st.tuples(
 
 
 def of(bad: list[float], fine: list[float]) -> Sample:
-    labels = [True] * len(bad) + [False] * len(fine)
-    return Sample(np.array(bad + fine), np.array(labels), tuple(range(len(labels))))
+    labels = np.array([True] * len(bad) + [False] * len(fine))
+    everything = np.ones(len(labels), bool)
+    return Sample(np.array(bad + fine), labels, everything, Clusters.of(range(len(labels))))
 
 
 def value(statistic: object, given_: Sample) -> float:
@@ -120,27 +127,65 @@ def test_the_lowest_score_of_a_run_counts() -> None:
         good(1, judged=seen(None, None)),
         good(2, of="harmless", judged=seen(0.7, 0.9)),
     ]
-    whole = sample(rows, "scene-graph")
-    assert whole.score.tolist() == [0.5, 0.1, 0.1, 0.8, math.inf, 0.7]
-    assert sample(rows, "scene-graph", "undisturbed").score.tolist() == [
-        0.5,
-        0.1,
-        0.1,
-        0.8,
-        math.inf,
-    ]
-    timely = sample(rows, "scene-graph", in_time=True)
-    assert timely.score.tolist() == [0.95, 0.6, 0.8, math.inf, 0.7]
-    found = sweep_metrics(rows, "scene-graph")
+    line = Line.by(Watches.of(rows), "scene-graph")
+    assert counted(line) == [0.5, 0.1, 0.1, 0.8, math.inf, 0.7]
+    assert counted(line, "undisturbed") == [0.5, 0.1, 0.1, 0.8, math.inf]
+    assert counted(line, ALL, in_time=True) == [0.95, 0.6, 0.8, math.inf, 0.7]
+    found = sweep_metrics(line)
     assert (found["auroc_all"].value, found["auroc_all"].n) == (1.0, 6)
+    assert found["auroc_in_time_all"].value == pytest.approx(4 / 6)
     assert found["in_time_fa10_all"].value == 0.5
 
 
-def test_runs_that_a_detector_did_not_watch_are_counted() -> None:
+def counted(line: Line, negatives: str = ALL, in_time: bool = False) -> list[float]:
+    """Scores of the failing runs, the undisturbed and the harmless ones, in this order."""
+    found = sample(line, negatives, in_time=in_time)
+    order = {"robofail": 0, "undisturbed": 1, "harmless": 2}
+    places = sorted(range(len(line.of)), key=lambda k: (order[line.of.rows[k].set], k))
+    return [float(found.score[k]) for k in places if found.counted[k]]
+
+
+def test_runs_that_a_judge_did_not_watch_are_left_out() -> None:
     both = judged({"scene-graph": [0.5], "image": [0.99]})
     rows = [failing(0, judged=both), failing(1, judged=seen(0.5)), good(0, judged=both)]
-    found = sample(rows, "image")
-    assert (len(found.score), found.unread) == (2, 1)
+    assert counted(Line.by(Watches.of(rows), "image")) == [0.99, 0.99]
+
+
+def test_boundaries_in_time_are_held_against_faultless_ones() -> None:
+    bad = tuple(
+        replace(j, possible=True, reachable=j.index < 1)
+        for j in seen(0.3, 0.5, None, 0.1)  # in time at the second and the third
+    )
+    fine = tuple(replace(j, possible=True, reachable=True) for j in seen(0.4, 0.5, 0.9))
+    line = Line.by(Watches.of([failing(0, judged=bad), good(1, judged=fine)]), "scene-graph")
+    found = boundary_area(line)
+    # 0.5 against 0.3, 0.4, 0.5, 0.9: half and one; nothing judged: none
+    assert found.value == pytest.approx(1.5 / 8)
+    assert found.n == 6
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.lists(scores, min_size=1, max_size=3), min_size=2, max_size=5), st.data())
+def test_the_area_of_boundaries_is_what_it_is_defined_as(
+    runs: list[list[float]], data: st.DataObject
+) -> None:
+    bad = data.draw(st.integers(1, len(runs) - 1))
+    rows = [
+        failing(k, known=0, effect=9, judged=untrue(run))
+        if k < bad
+        else good(k, judged=seen(*(None if math.isinf(x) else x for x in run)))
+        for k, run in enumerate(runs)
+    ]
+    line = Line.by(Watches.of(rows), "scene-graph")
+    first = [x for run in runs[:bad] for x in run]
+    second = [x for run in runs[bad:] for x in run]
+    assert boundary_area(line).value == pytest.approx(naive_auroc(first, second))
+
+
+def untrue(run: list[float]) -> tuple[Judged, ...]:
+    """Boundaries from which the goal is out of reach."""
+    given_ = seen(*(None if math.isinf(x) else x for x in run))
+    return tuple(replace(j, reachable=False) for j in given_)
 
 
 def test_without_other_runs_nothing_is_measured() -> None:

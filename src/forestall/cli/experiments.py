@@ -167,7 +167,7 @@ def _show(summary: dict[str, Any], tables: Sequence[Table], folder: Path, as_jso
         if table.name in MAIN_TABLES:
             console.print(f"\n[bold]{table.title}[/]")
             print_table(table.header, list(table.rows))
-    for line in summary["orderings"]:
+    for line in summary["profiles"][summary["shown"]]["orderings"]:
         console.print(printable(line["sentence"]), soft_wrap=True, markup=False)
     for name, value in summary["meta"]["effort"].items():
         console.print(printable(f"{name}: {value}"), soft_wrap=True, markup=False)

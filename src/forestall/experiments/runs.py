@@ -20,8 +20,9 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, STRATEGY
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
-from forestall.statistics.metrics import PAPER_SET, THRESHOLDS
+from forestall.statistics.judges import THRESHOLDS
 from forestall.statistics.rows import EXACT, HONEST, KIND, PLAIN, Setup
+from forestall.statistics.watches import PAPER_SET
 from forestall.tasks.variation import MOST
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "all")

@@ -22,8 +22,8 @@ from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
 from forestall.seams import WorldPart
-from forestall.statistics.metrics import WATCH
 from forestall.statistics.rows import EXACT, KIND, PLAIN, EpisodeRow, Judged
+from forestall.statistics.watches import WATCH
 from forestall.tasks.causes import causes
 from forestall.tasks.faults import knowable
 from forestall.tasks.losses import losses

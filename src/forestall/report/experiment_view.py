@@ -1,6 +1,6 @@
 """What the page of an experiment shows, as plain values for the template.
 
-Called by `experiment_page.py`; calls `figure_data.py` and the figures. Numbers are the summary's,
+Called by `experiment_page.py`; calls `figure_views.py`. Numbers are the summary's,
 only written out here; what is not there is said to be missing.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from forestall.report import figure_data as data
-from forestall.report import figures, run_figures
+from forestall.report.figure_views import FigureView, figures_of, household_figures_of
 
 if TYPE_CHECKING:
     from forestall.statistics.rows import EpisodeRow
@@ -37,25 +37,6 @@ RESERVED = ("title", "findings", "names")
 """Keys of `meta` that have a place of their own; the others are listed as facts."""
 
 MISSING = "not measured"
-
-
-@dataclass(frozen=True, slots=True)
-class FigureView:
-    """One figure.
-
-    Args:
-        name: of its file, without ending.
-        title: above it.
-        caption: what there is to see.
-        svg: the file; None where there is nothing to draw.
-        missing: why there is nothing.
-    """
-
-    name: str
-    title: str
-    caption: str
-    svg: bytes | None
-    missing: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +83,7 @@ class EpisodeView:
     seed: int
     strategy: str
     how: str
+    profile: str
     result: str  # "reached", "not reached" or "broke off"
     alarm: str
     cause: str
@@ -123,6 +105,7 @@ class View:
     verdicts: tuple[tuple[str, str, str, int], ...]
     compared: tuple[ComparedView, ...]
     figures: tuple[FigureView, ...]
+    profile: str
     episodes: tuple[EpisodeView, ...]
     filters: tuple[tuple[str, tuple[str, ...]], ...]
 
@@ -136,15 +119,19 @@ def experiment_view(
     """Everything that the template needs."""
     ordered = sorted(rows, key=_order)
     names = dict(meta.get("names") or summary.get("names") or {})
-    topics = _topics(summary)
+    profile = summary["shown"]
+    content = summary["profiles"][profile]
+    topics = _topics(content)
     lines = [line for topic in topics for line in topic.lines]
     episodes = tuple(_episode(r, links) for r in ordered)
-    counts = Counter(r.set for r in ordered)
+    of_profile = Counter(r.profile for r in ordered)
+    counts = Counter(r.set for r in ordered if r.profile == profile)
     facts = [(k, _words(v)) for k, v in meta.items() if k not in RESERVED]
     return View(
         title=str(meta.get("title", "The experiments")),
         keys=(
             ("episodes", f"{len(ordered):,}"),
+            *((p, f"{n:,}") for p, n in of_profile.items() if len(of_profile) > 1),
             *((s, f"{counts[s]:,}") for s in sorted(counts, key=_set_order)),
         ),
         facts=tuple(facts),
@@ -153,135 +140,18 @@ def experiment_view(
         findings=tuple(str(x) for x in meta.get("findings", ())),
         topics=topics,
         verdicts=_counted(lines),
-        compared=tuple(_compared(p) for p in summary.get("paper", ())),
-        figures=figures_of(ordered, summary, names),
+        compared=tuple(_compared(p) for p in content["paper"]),
+        figures=(
+            *household_figures_of(summary, names),
+            *figures_of([r for r in ordered if r.profile == profile], content, names),
+        ),
+        profile=profile if len(of_profile) > 1 else "",
         episodes=episodes,
         filters=tuple(
             (name, values)
-            for name in ("set", "task", "kind", "strategy", "result")
+            for name in ("set", "task", "kind", "strategy", "result", "profile")
             if len(values := tuple(dict.fromkeys(getattr(e, name) for e in episodes))) > 1
         ),
-    )
-
-
-def figures_of(
-    rows: Sequence[EpisodeRow], summary: Mapping[str, Any], names: Mapping[str, str]
-) -> tuple[FigureView, ...]:
-    """All figures, also those for which there is nothing."""
-
-    def name(of: str) -> str:
-        return names.get(of, of)
-
-    no_watch = "no run was watched by detectors"
-    return (
-        _success(summary, name),
-        _timelines(rows, name),
-        _roc(summary, name, no_watch),
-        _by_kind(summary, name, no_watch),
-        _knowability(summary, name, no_watch),
-        _scores(rows, summary, name, no_watch),
-        _time(summary, name),
-    )
-
-
-def _success(summary: Mapping[str, Any], name: data.Names) -> FigureView:
-    panels = data.success(summary, name)
-    return FigureView(
-        "success",
-        "Success by strategy",
-        "Share of runs that reached the goal under the strict check, with the exact 95 % interval. "
-        "On the two failing sets further right is better; on undisturbed and harmless runs, what a "
-        "strategy lies below “none” is the harm that its false alarms do. Hollow: the paper’s "
-        "value, measured on other scenes.",
-        run_figures.dots(panels, "success") if panels else None,
-        "no strategy was run",
-    )
-
-
-def _timelines(rows: Sequence[EpisodeRow], name: data.Names) -> FigureView:
-    found = data.timelines(rows, name)
-    caption, svg = "", None
-    if found is not None:
-        row, lanes = found
-        svg = run_figures.timelines(lanes)
-        caption = (
-            f"{row.task}, {row.scenario or 'undisturbed'}, seed {row.seed}: the same start under "
-            "each strategy. One that acts ahead raises its alarm left of the cross; one that "
-            "checks afterwards replans when the harm is done. The case is chosen to show that "
-            "difference, so it says nothing of how often it occurs."
-        )
-    return FigureView(
-        *("timelines", "One failure, every strategy", caption, svg),
-        "no failing case was run under two strategies",
-    )
-
-
-def _roc(summary: Mapping[str, Any], name: data.Names, missing: str) -> FigureView:
-    panels = data.roc(summary, name)
-    return FigureView(
-        "roc",
-        "Detection against false alarms",
-        "Share of failing runs with an alarm against share of undisturbed and harmless runs with "
-        "one, over all thresholds. Filled marks: thresholds 0.90, 0.85 and 0.80, written out for "
-        "the first detector. Hollow: detectors without a score. A curve near the dotted line is no "
-        "better than chance; a detection rate alone, without its place from left to right, means "
-        "little.",
-        figures.roc(panels) if panels else None,
-        missing if not summary.get("detectors") else "failing runs or runs without a failure lack",
-    )
-
-
-def _by_kind(summary: Mapping[str, Any], name: data.Names, missing: str) -> FigureView:
-    kinds, series = data.by_kind(summary, name)
-    return FigureView(
-        "kinds",
-        "Detection by kind of failure",
-        "Share of runs of each kind (how many in brackets) with an alarm at threshold 0.90, with "
-        "the exact 95 % interval; few runs make wide intervals. False alarms are not in this "
-        "figure: compare rows, and see the figure above for columns.",
-        figures.by_kind(kinds, series) if kinds and series else None,
-        missing,
-    )
-
-
-def _knowability(summary: Mapping[str, Any], name: data.Names, missing: str) -> FigureView:
-    groups = data.knowability(summary, name)
-    return FigureView(
-        "knowability",
-        "When the alarm comes",
-        "Failing runs by through what the failure can be known, at threshold 0.90. In time: from "
-        "the moment at which it can be known until the step that does the harm. An alarm that came "
-        "before anything was wrong counts as a detection in the paper’s rate and is luck.",
-        figures.knowability(groups) if groups else None,
-        missing,
-    )
-
-
-def _scores(
-    rows: Sequence[EpisodeRow], summary: Mapping[str, Any], name: data.Names, missing: str
-) -> FigureView:
-    found = data.distributions(rows, summary, name)
-    return FigureView(
-        "scores",
-        "How low scores fall",
-        "The lowest score of each run, cumulated. A detector tells failing runs apart where the "
-        "solid line runs left of the dashed ones; what lies left of the upright line raises an "
-        "alarm at threshold 0.90. Scales differ between detectors.",
-        figures.scores(found) if found else None,
-        missing,
-    )
-
-
-def _time(summary: Mapping[str, Any], name: data.Names) -> FigureView:
-    of, spent = data.time_spent(summary, name)
-    return FigureView(
-        "time",
-        "Time",
-        f"Mean seconds of a run on the {of} set, successful or not: what the robot took and what "
-        "judging and planning took on this machine. A strategy that fails early is quick. Hollow: "
-        "the paper’s total, with other scenes, durations and a remote language model.",
-        run_figures.time_spent(spent) if spent else None,
-        "no strategy was run",
     )
 
 
@@ -340,6 +210,8 @@ def _episode(row: EpisodeRow, links: Mapping[str, str]) -> EpisodeView:
     how = [] if row.strategy in ("none", data.WATCH) else [f"{row.detector} {row.threshold:.2f}"]
     if row.without is not None:
         how.append(f"without {row.without}")
+    how += [f"{row.model} model"] if row.model != "exact" else []
+    how += [f"{row.demonstrations} demonstrations"] if row.demonstrations != "4" else []
     if row.implied:
         how.append("no alarm, hence as unmonitored")
     broke = row.end == "error"
@@ -351,6 +223,7 @@ def _episode(row: EpisodeRow, links: Mapping[str, str]) -> EpisodeView:
         seed=row.seed,
         strategy=row.strategy,
         how=", ".join(how),
+        profile=row.profile,
         result="broke off" if broke else "reached" if row.success else "not reached",
         alarm="" if alarm is None else f"{alarm.when} {alarm.subtask}".strip(),
         cause="" if alarm is None else alarm.cause,
@@ -363,8 +236,16 @@ def _order(row: EpisodeRow) -> tuple[Any, ...]:
     known = data.STRATEGIES
     place = known.index(row.strategy) if row.strategy in known else -1
     return (
-        *(_set_order(row.set), row.task, row.scenario or "", row.seed, place, row.strategy),
-        *(row.detector, row.threshold, row.without or ""),
+        *(
+            row.profile,
+            _set_order(row.set),
+            row.task,
+            row.scenario or "",
+            row.seed,
+            place,
+            row.strategy,
+        ),
+        *(row.detector, row.threshold, row.without or "", row.model, row.demonstrations),
     )
 
 

@@ -37,8 +37,8 @@ _CASE = tuple[str, str, str, int]
 
 
 def detectors(summary: Summary) -> tuple[str, ...]:
-    """Detectors with scores of their own, the four of the paper first."""
-    found = [d for d, m in summary.get("detectors", {}).items() if "auroc_all" in m]
+    """Detectors with scores of their own and as many demonstrations as usual, the paper's first."""
+    found = [d for d in summary.get("main_judges", ()) if d in summary.get("detectors", {})]
     return tuple(sorted(found, key=lambda d: (_place(d, DETECTORS), d)))
 
 
@@ -56,7 +56,7 @@ def main_detectors(summary: Summary) -> tuple[str, ...]:
 def roc(summary: Summary, names: Names) -> tuple[tuple[str, tuple[Curve, ...]], ...]:
     """Curves in two panels: the detectors with the trivial ones, and the parts of the score."""
     of = summary.get("detection_set", SETS[0])
-    lines = summary.get("roc", {}).get(of, {})
+    lines = summary.get("curves", {}).get(of, {})
     measured = summary.get("detectors", {})
 
     def line(name: str) -> Curve | None:
@@ -180,9 +180,9 @@ def distributions(
     runs = [r for r in rows if r.strategy == WATCH]
     failing = summary.get("detection_set", SETS[0])
     groups = {
-        "failing": [r for r in runs if r.set == failing],
-        "undisturbed": [r for r in runs if r.set == "undisturbed"],
-        "harmless": [r for r in runs if r.set == "harmless"],
+        "failing": [r for r in runs if r.failing and failing in ("all", r.set)],
+        "undisturbed": [r for r in runs if not r.failing and r.scenario is None],
+        "harmless": [r for r in runs if not r.failing and r.scenario is not None],
     }
     found = []
     for detector in detectors(summary):
@@ -279,13 +279,14 @@ def _strategy(row: EpisodeRow) -> str:
     return "none" if row.strategy == WATCH else row.strategy
 
 
-def _preferred(row: EpisodeRow) -> tuple[bool, bool, bool, str, float]:
+def _preferred(row: EpisodeRow) -> tuple[bool, bool, bool, bool, str, float, str]:
     """Small for the run that stands for its strategy: what it is by default, and was run."""
     return (
         row.implied,
+        row.model != "exact",
         row.detector != _FULL,
         f"{row.threshold:.2f}" != THRESHOLDS[0],
-        *(row.detector, row.threshold),
+        *(row.detector, row.threshold, row.demonstrations),
     )
 
 

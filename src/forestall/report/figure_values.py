@@ -108,3 +108,21 @@ class Spent:
     computing_s: float
     n: int
     paper: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Banded:
+    """A line with its band, or a single point with its interval.
+
+    Args:
+        label: its name as shown.
+        points: (x, y, low, high) in the order of the line; without low and high there is no band.
+        steps: whether it keeps its height up to the next point.
+        mark: (x, y) of the threshold in use, if there is one. `span`: (low, high) of its y.
+    """
+
+    label: str
+    points: tuple[tuple[float, float, float | None, float | None], ...]
+    steps: bool = False
+    mark: tuple[float, float] | None = None
+    span: tuple[float, float] | None = None

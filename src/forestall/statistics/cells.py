@@ -8,10 +8,10 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from forestall.statistics.metrics import THRESHOLDS
+from forestall.statistics.judges import THRESHOLDS
 
 DASH = "–"
 
@@ -43,6 +43,10 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     timed: bool = False
+
+    def of(self, profile: str) -> Table:
+        """The same of a household that is not the one shown first."""
+        return replace(self, name=f"{self.name}-{profile}", title=f"{self.title}: {profile}")
 
     def markdown(self) -> str:
         """With its title as a heading and its note below."""
@@ -121,7 +125,7 @@ def shown(name: str, names: Names) -> str:
     """A name with every detector in it shown as what it is."""
     if name in names:
         return names[name]
-    for mark in (", detector ", ", threshold ", ", without ", " + ", "@"):
+    for mark in (", detector ", ", threshold ", ", without ", " + ", "@", " or ", " and ", ", "):
         first, found, rest = name.partition(mark)
         if found:
             between = " at " if mark == "@" else mark

@@ -10,9 +10,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from forestall.statistics.cells import points, share
-from forestall.statistics.metrics import ALWAYS, PAPER_SET, TRUTH
+from forestall.statistics.metrics import ALWAYS, TRUTH
 from forestall.statistics.outcomes import DETECTOR, NO_STRATEGY, ONLINE, PROACTIVE
 from forestall.statistics.paper import ABLATIONS
+from forestall.statistics.watches import PAPER_SET
 
 Summary = Mapping[str, Any]
 Metrics = Mapping[str, Mapping[str, Any]]
@@ -26,7 +27,8 @@ WEAK = 0.7
 
 
 def findings(summary: Summary) -> list[str]:
-    """Sentences for the page, each from numbers of the summary."""
+    """Sentences for the page, of the household that is shown first; see also `sentences`."""
+    content = {**summary["profiles"][summary["shown"]], "names": summary["names"]}
     return [
         sentence
         for part in (
@@ -39,7 +41,7 @@ def findings(summary: Summary) -> list[str]:
             _chance,
             _strategies,
         )
-        for sentence in part(summary)
+        for sentence in part(content)
     ]
 
 
@@ -106,7 +108,7 @@ def _reasoned(summary: Summary) -> Iterator[str]:
 
 
 def _kinds(summary: Summary) -> Iterator[str]:
-    kinds = summary["by_kind"].get(PAPER_SET, {})
+    kinds = summary["by_kind"].get(summary["detection_set"], {})
     weak = [
         f"{kind} {share(rates['fdr'])}"
         for kind, found in kinds.items()
@@ -125,7 +127,7 @@ def _knowable(summary: Summary) -> Iterator[str]:
     }
     said = [
         f"{words[of]} {share(rates['fdr'])}"
-        for of, found in summary["by_knowable"].get(PAPER_SET, {}).items()
+        for of, found in summary["by_knowable"].get(summary["detection_set"], {}).items()
         if (rates := found["detectors"].get(f"{DETECTOR}@0.90"))
     ]
     if said:

@@ -1,209 +1,109 @@
-"""How well alarms tell failing runs from others: detection, false alarms, lead.
+"""How well alarms tell failing runs from others: detection, false alarms, lead, named cause.
 
-Calls: `summary`, `orderings` → here → `intervals`. Everything is computed from the rows of runs
-that nobody interrupted (strategy "watch"), in which many detectors judged the same observations; a
-boundary raises an alarm when its score lies below the threshold (paper, Sec. 3.3). A boundary
-without a score raises none, and a run that broke off raises none from there on.
+Calls: `judgements`, `orderings` → here → `watches`, `intervals`. A boundary raises an alarm when
+its score lies below the threshold (paper, Sec. 3.3). A boundary without a score raises none, and a
+run that broke off raises none from there on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from forestall.errors import InputError
-from forestall.statistics.cases import UNDISTURBED, Case
+from forestall.statistics.causes import Agreement, cause_named
 from forestall.statistics.intervals import (
     NOTHING,
     SEED,
+    Bools,
     Floats,
     Metric,
+    Ratio,
     bootstrap,
     divided,
-    rate,
-    ratio,
+    measured,
 )
-from forestall.statistics.intervals import proportion as exact
-from forestall.statistics.rows import EpisodeRow, Judged
-
-WATCH = "watch"
-HARMLESS = "harmless"
-PAPER_SET = "robofail"
-
-THRESHOLDS = (0.90, 0.85, 0.80)
-"""Of the paper's experiments (Sec. 4, "Analysis of Potential Failure Detection")."""
+from forestall.statistics.judges import Together, thresholds_of
+from forestall.statistics.rows import Judged
+from forestall.statistics.watches import ALL, PAPER_SET, Watches
 
 RANDOM_DRAWS = 200
 
 ALWAYS, NEVER, RANDOM, TRUTH = "always", "never", "random", "true plan check"
 TRIVIAL = (ALWAYS, NEVER, RANDOM, TRUTH)
-"""Detectors that cost nothing, and the simulator's truth as the upper bound."""
+"""Judges that cost nothing, and the simulator's truth as the upper bound."""
 
 
-def order(row: EpisodeRow) -> tuple[str | int | float, ...]:
-    """Where a row stands among others, whatever order they were written in."""
-    return (
-        row.profile,
-        row.set,
-        row.task,
-        row.scenario or "",
-        row.seed,
-        row.strategy,
-        row.detector,
-        row.threshold,
-        row.without or "",
-        row.model,
-        row.demonstrations,
-    )
-
-
-def canonical(rows: Iterable[EpisodeRow]) -> tuple[EpisodeRow, ...]:
-    """Rows in a fixed order.
-
-    Raises:
-        InputError: one episode is there twice; it would count twice.
-    """
-    found = sorted(rows, key=order)
-    for one, other in pairwise(found):
-        if order(one) == order(other):
-            raise InputError(f"two rows of the same episode: {order(one)}")
-    return tuple(found)
-
-
-def case_of(row: EpisodeRow) -> Case:
-    """The case that a row is an episode of."""
-    return Case(row.set, row.task, row.scenario, row.seed)
-
-
-def scene_of(row: EpisodeRow) -> Hashable:
-    """What episodes share that are not independent of each other."""
-    return row.task, row.seed
-
-
-def watched(rows: Iterable[EpisodeRow]) -> tuple[EpisodeRow, ...]:
-    """The runs that detectors watched, one of each case, in a fixed order.
-
-    Raises:
-        InputError: two of one case.
-    """
-    found = canonical(r for r in rows if r.strategy == WATCH)
-    for one, other in pairwise(found):
-        if case_of(one) == case_of(other):
-            raise InputError(f"two watched runs of one case: {case_of(one)}")
-    return found
-
-
-def boundaries(row: EpisodeRow) -> tuple[Judged, ...]:
-    """The moments of a watched run at which an alarm could have been raised."""
-    return tuple(j for j in row.judged if j.when == "before" or j.scores)
-
-
-def scores(row: EpisodeRow, detector: str) -> dict[int, float | None] | None:
-    """Score by place among the boundaries, None when the detector did not watch this run."""
-    found = {k: j.scores[detector] for k, j in enumerate(boundaries(row)) if detector in j.scores}
-    return found if found or not boundaries(row) else None
-
-
-def detectors(rows: Iterable[EpisodeRow]) -> tuple[str, ...]:
-    """Every detector that gave a score, sorted."""
-    return tuple(
-        sorted({d for r in rows if r.strategy == WATCH for j in r.judged for d in j.scores})
-    )
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Alarms:
-    """Where a detector raised alarms in one run.
+    """Where a judge raised alarms in watched runs.
 
     Args:
-        row: the run.
+        of: the runs.
         raised: (draws, boundaries); several draws for chance, and for a mean over thresholds.
+        seen_by: (runs,) which of them it watched.
+        names: of the judges whose word counts for what they name.
     """
 
-    row: EpisodeRow
-    raised: NDArray[np.bool_]
+    of: Watches
+    raised: Bools
+    seen_by: Bools
+    names: tuple[str, ...] = ()
 
-    def share(self, first: float = -np.inf, last: float = np.inf) -> float:
-        """Share of draws with an alarm at a boundary from `first` to `last`."""
-        return float(self.raised[:, self._between(first, last)].any(axis=1).mean())
+    @property
+    def single(self) -> bool:
+        """Whether there is one draw, so that what is counted are things."""
+        return len(self.raised) == 1
 
-    def raised_before(self, index: float = np.inf) -> tuple[float, int]:
-        """Mean number of alarms before a position, and of boundaries there."""
-        inside = self._between(-np.inf, index - 0.5)
-        return float(self.raised[:, inside].sum(axis=1).mean()), int(inside.sum())
+    def counts(self, where: Bools | None = None) -> Floats:
+        """Alarms of each run at some boundaries, (draws, runs)."""
+        raised = self.raised if where is None else self.raised & where
+        return np.stack([self.of.per_run(line) for line in raised])
 
-    def lead(self) -> tuple[float, float, float]:
-        """Subtasks and seconds from the first alarm in time to the harm, and share of draws.
+    def share(self, where: Bools | None = None) -> Floats:
+        """Share of draws with an alarm at some boundaries, (runs,)."""
+        found: Floats = (self.counts(where) > 0).mean(axis=0)
+        return found
 
-        Both are summed over draws with an alarm in time and divided by the number of draws.
-        """
-        known, effect = moments(self.row)
-        places = np.flatnonzero(self._between(known, effect))
-        raised = self.raised[:, places]
-        hit = raised.any(axis=1)
-        if not hit.any():
-            return 0.0, 0.0, 0.0
-        there = boundaries(self.row)
-        at = [j.time_s for j in there if j.index == effect]
-        harm_s = at[0] if at else self.row.simulated_s
-        first = [there[places[k]] for k in raised[hit].argmax(axis=1)]
-        draws = len(self.raised)
-        return (
-            sum(effect - j.index for j in first) / draws,
-            sum(harm_s - j.time_s for j in first) / draws,
-            float(hit.mean()),
-        )
+    def first_timely(self) -> list[tuple[np.int64, np.int64]]:
+        """(run, boundary) of the first alarm in time, of every draw one after the other."""
+        found = []
+        for line in self.raised & self.of.timely:
+            places = np.flatnonzero(line)
+            runs, first = np.unique(self.of.run[places], return_index=True)
+            found += list(zip(runs, places[first], strict=True))
+        return [(r, b) for r, b in found if self.seen_by[r]]
 
-    def _between(self, first: float, last: float) -> NDArray[np.bool_]:
-        index = np.array([j.index for j in boundaries(self.row)], float)
-        return (index >= first) & (index <= last)
+    def of_runs(self, where: Bools) -> Alarms:
+        """The same, counted on some runs only."""
+        return Alarms(self.of, self.raised, self.seen_by & where, self.names)
 
 
-def moments(row: EpisodeRow) -> tuple[int, int]:
-    """When a failing run can first be known to fail, and when the harm is done.
-
-    Raises:
-        InputError: the run is not a failing one.
-    """
-    if row.known is None or row.effect is None:
-        raise InputError(
-            f"{case_of(row)} does not say when its failure can be known and takes effect"
-        )
-    return row.known, row.effect
+def at_thresholds(of: Watches, judge: str, thresholds: Sequence[float] | None = None) -> Alarms:
+    """A judge's alarms, one draw for each threshold; its own one by default."""
+    line = np.nan_to_num(of.scores[judge], nan=np.inf)
+    found = thresholds_of(judge)[:1] if thresholds is None else thresholds
+    raised = line[None, :] < np.array(found, float)[:, None]
+    return Alarms(of, raised, of.seen_by[judge], (judge,))
 
 
-def foreseeable(row: EpisodeRow) -> bool:
-    """Whether the failure can be known before the harm is done."""
-    known, effect = moments(row)
-    return known <= effect
-
-
-def at_thresholds(
-    rows: Iterable[EpisodeRow], detector: str, thresholds: Sequence[float]
-) -> list[Alarms]:
-    """A detector's alarms in the runs that it watched, one draw for each threshold."""
-    found = []
-    for row in rows:
-        given = scores(row, detector)
-        if given is not None:
-            value = [given.get(k) for k in range(len(boundaries(row)))]
-            line = np.array([np.inf if v is None else v for v in value], float)
-            found.append(Alarms(row, line[None, :] < np.array(thresholds, float)[:, None]))
-    return found
+def asked_together(of: Watches, pair: Together) -> Alarms:
+    """Alarms of two judges that are asked together, each at its own threshold."""
+    one, other = (at_thresholds(of, name) for name in (pair.first, pair.second))
+    raised = one.raised & other.raised if pair.both else one.raised | other.raised
+    return Alarms(of, raised, one.seen_by & other.seen_by, (pair.first, pair.second))
 
 
 class _Rule(Protocol):
     def __call__(self, judged: Judged, /) -> bool: ...
 
 
-def by_rule(rows: Iterable[EpisodeRow], rule: _Rule) -> list[Alarms]:
+def by_rule(of: Watches, rule: _Rule, names: tuple[str, ...] = ()) -> Alarms:
     """Alarms wherever a rule says so."""
-    return [Alarms(r, np.array([[rule(j) for j in boundaries(r)]], bool)) for r in rows]
+    raised = np.array([[rule(j) for j in of.judged]], bool)
+    return Alarms(of, raised, np.ones(len(of), bool), names)
 
 
 def confirmed(judged: Judged) -> bool:
@@ -216,124 +116,184 @@ def impossible(judged: Judged) -> bool:
     return judged.reachable is False or judged.possible is False
 
 
-def at_random(rows: Iterable[EpisodeRow], like: Sequence[Alarms]) -> list[Alarms]:
-    """Alarms at random boundaries, at the rate per boundary of another detector's alarms."""
-    raised = sum(a.raised_before()[0] for a in like)
-    there = sum(a.raised_before()[1] for a in like)
-    often = raised / there if there else 0.0
+def false_rate(like: Alarms) -> float:
+    """How many of the faultless boundaries that it watched a judge raises an alarm at."""
+    there = like.of.faultless & like.seen_by[like.of.run]
+    return float(like.raised[:, there].mean()) if there.any() else 0.0
+
+
+def at_random(of: Watches, like: Alarms) -> Alarms:
+    """Alarms at random boundaries, at another judge's rate of false alarms per boundary."""
     random = np.random.default_rng(SEED)
-    return [Alarms(r, random.random((RANDOM_DRAWS, len(boundaries(r)))) < often) for r in rows]
+    drawn = random.random((RANDOM_DRAWS, len(of.judged)))
+    return Alarms(of, drawn < false_rate(like), np.ones(len(of), bool))
 
 
-def trivial(rows: Sequence[EpisodeRow], like: Sequence[Alarms]) -> dict[str, list[Alarms]]:
-    """The trivial detectors on the same runs; chance fires as often as `like`."""
+def trivial(of: Watches, like: Alarms) -> dict[str, Alarms]:
+    """The trivial judges on the same runs; chance has as many false alarms as `like`."""
     return {
-        ALWAYS: by_rule(rows, lambda _: True),
-        NEVER: by_rule(rows, lambda _: False),
-        RANDOM: at_random(rows, like),
-        TRUTH: by_rule(rows, impossible),
+        ALWAYS: by_rule(of, lambda _: True),
+        NEVER: by_rule(of, lambda _: False),
+        RANDOM: at_random(of, like),
+        TRUTH: by_rule(of, impossible),
     }
 
 
-def point_metrics(alarms: Sequence[Alarms], failing: str = PAPER_SET) -> dict[str, Metric]:
+def point_metrics(alarms: Alarms, failing: str = PAPER_SET) -> dict[str, Metric]:
     """Everything that can be said of one operating point.
 
     Args:
-        alarms: of failing, undisturbed and harmless runs.
-        failing: which set the detection rates are about.
+        alarms: in failing and other runs.
+        failing: the set of the failing ones, or `ALL`.
     """
-    bad = [a for a in alarms if a.row.set == failing]
-    undisturbed = [a for a in alarms if a.row.set == UNDISTURBED]
-    harmless = [a for a in alarms if a.row.set == HARMLESS]
-    found = detection_metrics(bad)
-    found |= false_alarm_metrics(undisturbed, UNDISTURBED) | false_alarm_metrics(harmless, HARMLESS)
-    found["pairs_apart"] = pairs_apart(bad, undisturbed)
-    found[f"balanced_accuracy_{UNDISTURBED}"] = balanced_accuracy(bad, undisturbed)
-    found["balanced_accuracy_all"] = balanced_accuracy(bad, undisturbed + harmless)
-    return found
+    bad = alarms.of.of_set(failing) & alarms.seen_by
+    ratios = detection_ratios(alarms, bad) | false_alarm_ratios(alarms) | _leads(alarms, bad)
+    ratios |= _told_apart(alarms, bad) | _named(alarms, bad)
+    mixed = {}
+    good = _groups(alarms)
+    for of in ("undisturbed", ALL):
+        ratios[f"quiet_{of}"] = _runs(alarms, 1 - alarms.share(), good[of])
+        mixed[f"balanced_accuracy_{of}"] = {"fdr": 0.5, f"quiet_{of}": 0.5}
+    found = measured(ratios, alarms.of.clusters, mixed)
+    found |= _chance(alarms, bad)
+    return {name: metric for name, metric in found.items() if not name.startswith("quiet")}
 
 
-def detection_rates(bad: Sequence[Alarms]) -> dict[str, Metric]:
+def detection_ratios(alarms: Alarms, bad: Bools) -> dict[str, Ratio]:
     """How many failing runs are detected.
 
     `fdr` counts as the paper does: any alarm anywhere in a failing run. `after_known` only counts
     alarms from when the failure can be known, `in_time` only those up to the harm, of the failures
     that can be known before it.
     """
-    seen = [a for a in bad if foreseeable(a.row)]
+    of = alarms.of
+    known = of.index >= of.known[of.run]
     return {
-        "fdr": _share([a.share() for a in bad], bad),
-        "in_time": _share([a.share(*moments(a.row)) for a in seen], seen),
-        "after_known": _share([a.share(moments(a.row)[0]) for a in bad], bad),
+        "fdr": _runs(alarms, alarms.share(), bad),
+        "in_time": _runs(alarms, alarms.share(of.timely), bad & of.foreseeable),
+        "after_known": _runs(alarms, alarms.share(known), bad),
     }
 
 
-def detection_metrics(bad: Sequence[Alarms]) -> dict[str, Metric]:
-    """Detection rates, alarms before a failure can be known, and lead over the harm."""
-    early = [a.raised_before(moments(a.row)[0]) for a in bad]
-    seen = [a for a in bad if foreseeable(a.row)]
-    leads = [a.lead() for a in seen]
-    scenes = [scene_of(a.row) for a in seen]
-    in_time = [share for _, _, share in leads]
-    hit = sum(share > 0 for share in in_time)
+def false_alarm_ratios(alarms: Alarms) -> dict[str, Ratio]:
+    """False alarms by boundary, run and hour; the runs that they are counted on end the name.
+
+    At a boundary an alarm is false where the truth has nothing against going on; those of failing
+    runs count among `ALL`. In a run, and in an hour, it is one in a run that does not fail.
+    """
+    of = alarms.of
+    false = alarms.counts(of.faultless).mean(axis=0)
+    chances = of.per_run(of.faultless)
+    any_alarm, found = alarms.share(), {}
+    for name, runs in _groups(alarms).items():
+        there = alarms.seen_by if name == ALL else runs
+        found[f"false_alarms_per_boundary_{name}"] = Ratio(
+            false * there, chances * there, whole=alarms.single
+        )
+        found[f"false_alarms_per_run_{name}"] = _runs(alarms, any_alarm, runs)
+        found[f"false_alarms_per_hour_{name}"] = Ratio(
+            alarms.counts().mean(axis=0) * runs, of.hours * runs, int(runs.sum()), False
+        )
+    return found
+
+
+def detection_rates(alarms: Alarms, bad: Bools) -> dict[str, Metric]:
+    """`detection_ratios`, and alarms in runs that do not fail, with their intervals."""
+    ratios = detection_ratios(alarms, bad & alarms.seen_by) | false_alarm_ratios(alarms)
+    return measured(ratios, alarms.of.clusters)
+
+
+def _groups(alarms: Alarms) -> dict[str, Bools]:
+    """Runs that do not fail, by what was arranged in them."""
+    of = alarms.of
+    groups = {"undisturbed": of.undisturbed, "harmless": of.harmless, ALL: ~of.failing}
+    return {name: runs & alarms.seen_by for name, runs in groups.items()}
+
+
+def _runs(alarms: Alarms, values: Floats, where: Bools) -> Ratio:
+    return Ratio(np.where(where, values, 0.0), where.astype(float), whole=alarms.single)
+
+
+def _leads(alarms: Alarms, bad: Bools) -> dict[str, Ratio]:
+    """Subtasks and seconds from the first alarm in time to the harm, and alarms before it."""
+    of = alarms.of
+    steps, seconds, hit = (np.zeros(len(of)) for _ in range(3))
+    for run, place in alarms.first_timely():
+        steps[run] += of.effect[run] - of.index[place]
+        seconds[run] += of.harm_s[run] - of.time_s[place]
+        hit[run] += 1
+    draws, n = len(alarms.raised), int(((hit > 0) & bad).sum())
+    before = of.index < of.known[of.run]
+    early = alarms.counts(before).mean(axis=0) * bad
     return {
-        **detection_rates(bad),
-        "early_alarms_per_boundary": _per_boundary(bad, early),
-        "lead_subtasks": ratio([k for k, _, _ in leads], in_time, scenes, hit),
-        "lead_s": ratio([s for _, s, _ in leads], in_time, scenes, hit),
+        "lead_subtasks": Ratio(steps * bad / draws, hit * bad / draws, n, False),
+        "lead_s": Ratio(seconds * bad / draws, hit * bad / draws, n, False),
+        "early_alarms_per_boundary": Ratio(early, of.per_run(before) * bad, whole=alarms.single),
     }
 
 
-def false_alarm_metrics(good: Sequence[Alarms], of: str) -> dict[str, Metric]:
-    """False alarms in runs of one set that would have succeeded; its name ends each metric's."""
-    return {
-        f"false_alarms_per_boundary_{of}": _per_boundary(good, [a.raised_before() for a in good]),
-        f"false_alarms_per_run_{of}": _share([a.share() for a in good], good),
-    }
-
-
-def pairs_apart(bad: Sequence[Alarms], undisturbed: Sequence[Alarms]) -> Metric:
+def _told_apart(alarms: Alarms, bad: Bools) -> dict[str, Ratio]:
     """Failing runs with an alarm whose undisturbed twin in the same room has none.
 
     Of a failing run and its twin, which differ in the fault alone, so many are told apart.
     """
-    twins = {case_of(a.row): a for a in undisturbed}
-    pairs = [(a, twins[twin]) for a in bad if (twin := case_of(a.row).twin) in twins]
-    apart = [
-        float((a.raised.any(axis=1) & ~b.raised.any(axis=1)).mean())
-        if len(a.raised) == len(b.raised)
-        else a.share() * (1 - b.share())
-        for a, b in pairs
-    ]
-    return _share(apart, [a for a, _ in pairs])
+    twins = alarms.of.twins
+    where = bad & (twins >= 0) & alarms.seen_by[twins]
+    alarmed = alarms.counts() > 0
+    apart = (alarmed & ~alarmed[:, twins]).mean(axis=0)
+    return {"pairs_apart": _runs(alarms, apart, where)}
 
 
-def balanced_accuracy(bad: Sequence[Alarms], good: Sequence[Alarms]) -> Metric:
-    """Mean of the share of failing runs with and of the other runs without any alarm."""
-    if not bad or not good:
-        return NOTHING
-    hit = np.array([a.share() for a in bad])
-    quiet = np.array([1 - a.share() for a in good])
+def _named(alarms: Alarms, bad: Bools) -> dict[str, Ratio]:
+    """Of the failing runs with an alarm in time whose cause is known: whether it was named then.
 
-    def value(w: Floats) -> Floats:
-        first, second = w[:, : len(hit)], w[:, len(hit) :]
-        sensitivity = divided(first @ hit, first.sum(axis=1))
-        return (sensitivity + divided(second @ quiet, second.sum(axis=1))) / 2
-
-    return bootstrap(value, [scene_of(a.row) for a in (*bad, *good)])
-
-
-def _share(values: Sequence[float], alarms: Sequence[Alarms]) -> Metric:
-    """Exact where each run either has it or not; a bootstrap for means over draws."""
-    if _single(alarms):
-        return exact([v > 0 for v in values])
-    return rate(values, [1] * len(values), [scene_of(a.row) for a in alarms], whole=False)
-
-
-def _per_boundary(alarms: Sequence[Alarms], counts: Sequence[tuple[float, int]]) -> Metric:
-    scenes = [scene_of(a.row) for a in alarms]
-    return rate([k for k, _ in counts], [n for _, n in counts], scenes, _single(alarms))
+    The first alarm in time counts, for it is the one that a robot would act upon.
+    """
+    of = alarms.of
+    if not alarms.names or not alarms.single:
+        return {}
+    exact, right, named, asked = (np.zeros(len(of)) for _ in range(4))
+    for run, place in alarms.first_timely():
+        causes = of.rows[run].causes
+        if not causes or not bad[run]:
+            continue
+        facts = [f for n in alarms.names for f in of.judged[place].named.get(n, ())]
+        agreement = cause_named(facts, causes)
+        asked[run] = 1
+        named[run] = agreement is not Agreement.NOTHING
+        exact[run] = agreement is Agreement.EXACT
+        right[run] = agreement.right
+    parts: Mapping[str, Floats] = {"exact": exact, "right": right, "named": named}
+    return {f"cause_{name}": Ratio(values, asked) for name, values in parts.items()}
 
 
-def _single(alarms: Sequence[Alarms]) -> bool:
-    return all(len(a.raised) == 1 for a in alarms)
+def _chance(alarms: Alarms, bad: Bools) -> dict[str, Metric]:
+    """What chance detects in time with as many false alarms per boundary, and how much more this.
+
+    Chance raises an alarm at each boundary with the judge's rate, whatever happens there.
+    """
+    of = alarms.of
+    seen = bad & of.foreseeable
+    if not seen.any() or not alarms.names:
+        return {"chance_in_time": NOTHING, "over_chance": NOTHING} if alarms.names else {}
+    false = alarms.counts(of.faultless).mean(axis=0) * alarms.seen_by
+    chances = of.per_run(of.faultless) * alarms.seen_by
+    length = of.per_run(of.timely)
+    lengths = np.unique(length[seen])
+    groups = np.stack([seen & (length == k) for k in lengths], axis=1).astype(float)
+    hit = alarms.share(of.timely) * seen
+    columns = np.column_stack([false, chances, hit, seen.astype(float), groups])
+
+    def both(w: Floats) -> tuple[Floats, Floats]:
+        sums = w @ columns
+        rate = np.nan_to_num(divided(sums[:, 0], sums[:, 1]))
+        caught = (sums[:, 4:] * (1 - (1 - rate[:, None]) ** lengths)).sum(axis=1)
+        return divided(caught, sums[:, 3]), divided(sums[:, 2], sums[:, 3])
+
+    n = int(seen.sum())
+    return {
+        "chance_in_time": bootstrap(lambda w: both(w)[0], of.clusters, n),
+        "over_chance": bootstrap(
+            lambda w: np.subtract(*both(w)[::-1]), of.clusters, n, differ=True
+        ),
+    }

@@ -1,28 +1,25 @@
-"""Whether the paper's orderings hold in the rows, each in a sentence.
+"""Whether the paper's orderings hold in the rows, each in a sentence; and what else is compared.
 
-Calls: `summary` → here → `intervals`. Two things are compared on the runs that both were measured
-on; an ordering holds when the interval of the difference lies above 0. Detectors are compared at
-equal false-alarm rates, since the one that alarms more often always detects more.
+Calls: `profile` → here → `sweep`, `outcomes`, `intervals`. Two things are compared on the runs that
+both were measured on; an ordering holds when the interval of the difference lies above 0. Judges
+are compared at equal false-alarm rates, since the one that alarms more often always detects more.
+Many are compared at once: `corrected` says what is left of a verdict when the p-values of its
+family are corrected by Holm's method.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from forestall.statistics.cells import Names, points, shown
-from forestall.statistics.intervals import NOTHING, Floats, Metric, bootstrap, mean
-from forestall.statistics.metrics import (
-    PAPER_SET,
-    THRESHOLDS,
-    at_thresholds,
-    scene_of,
-    scores,
-)
+from forestall.statistics.intervals import NOTHING, Floats, Metric, Ratio, bootstrap, measured
+from forestall.statistics.judges import THRESHOLDS, Together
+from forestall.statistics.metrics import at_thresholds
 from forestall.statistics.outcomes import (
     NO_STRATEGY,
     ONLINE,
@@ -31,11 +28,11 @@ from forestall.statistics.outcomes import (
     Runs,
     compared,
     of_set,
-    outcome_metrics,
+    succeeded,
 )
 from forestall.statistics.paper import ABLATIONS, FULL
-from forestall.statistics.rows import EpisodeRow
-from forestall.statistics.sweep import auroc, detection_at, sample
+from forestall.statistics.sweep import Line, auroc, detection_at, sample
+from forestall.statistics.watches import ALL, PAPER_SET, Watches
 
 HOLDS = "holds"
 FAILS = "does not hold"
@@ -45,27 +42,34 @@ UNMEASURED = "not measured"
 ENOUGH = 10
 """Fewer pairs than this decide nothing, however they come out."""
 
+ALPHA = 0.05
+"""Of a family of comparisons."""
+
 OTHER_DETECTORS = ("objects", "caption", "image")
 
-EQUAL_FALSE_ALARMS = {
-    "detection at 5 % false alarms": 0.05,
-    "detection at 10 % false alarms": 0.10,
-    "AUROC": None,
+EQUAL_FALSE_ALARMS: Mapping[str, tuple[float | None, bool]] = {
+    "detection at 5 % false alarms": (0.05, False),
+    "detection at 10 % false alarms": (0.10, False),
+    "AUROC": (None, False),
+    "AUROC in time": (None, True),
 }
+"""Measure → the rate of false alarms, None for the area, and whether only alarms in time count."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ordering:
-    """One ordering of the paper, held against the rows.
+    """One ordering, held against the rows.
 
     Args:
-        topic: "strategies", "detectors", "ablations" or "reasoning".
+        topic: "strategies", "detectors", "ablations" or "reasoning" of the paper, or another.
         better: name of what should be better.
         worse: name of what should be worse.
         measure: in which it should be, in words.
         first: value of the better one, None when not measured.
         second: value of the worse one, likewise.
         difference: first minus second on the same runs.
+        p: two-sided, that there is no difference.
+        p_holm: the same, corrected for its family.
     """
 
     topic: str
@@ -75,6 +79,8 @@ class Ordering:
     first: float | None
     second: float | None
     difference: Metric
+    p: float | None = None
+    p_holm: float | None = None
 
     @property
     def verdict(self) -> str:
@@ -88,8 +94,16 @@ class Ordering:
             return HOLDS
         return FAILS if high <= 0 else UNDECIDED
 
+    @property
+    def corrected(self) -> str:
+        """What is left of the verdict among its family; no difference at all stays none."""
+        same = self.difference.low == self.difference.high == 0
+        if self.verdict in (UNMEASURED, UNDECIDED) or same:
+            return self.verdict
+        return self.verdict if self.p_holm is not None and self.p_holm <= ALPHA else UNDECIDED
+
     def sentence(self, names: Names | None = None) -> str:
-        """The verdict in plain English, with detectors shown as `names` says."""
+        """The verdict in plain English, with judges shown as `names` says."""
         better, worse = (shown(n, names or {}) for n in (self.better, self.worse))
         claim = f"{better} over {worse} in {self.measure}"
         if self.first is None or self.second is None or self.difference.value is None:
@@ -98,10 +112,9 @@ class Ordering:
             f"{_percent(self.first)} against {_percent(self.second)}, difference "
             f"{points(self.difference.to_json())}"
         )
-        if self.verdict == HOLDS:
-            return f"{claim}: holds: {seen}."
-        if self.verdict == FAILS:
-            return f"{claim}: does not hold: {seen}."
+        if self.verdict in (HOLDS, FAILS):
+            lost = "" if self.corrected == self.verdict else " (not after Holm's correction)"
+            return f"{claim}: {self.verdict}{lost}: {seen}."
         if self.difference.n < ENOUGH or self.difference.low is None:
             return f"{claim}: not decided: too few runs: {seen}."
         return f"{claim}: not decided: the interval includes 0: {seen}."
@@ -117,27 +130,45 @@ class Ordering:
             "second": self.second,
             "difference": self.difference.to_json(),
             "verdict": self.verdict,
+            "p": self.p,
+            "p_holm": self.p_holm,
+            "corrected": self.corrected,
             "sentence": self.sentence(names),
         }
 
 
+def holm(family: Iterable[Ordering]) -> list[Ordering]:
+    """The same orderings with their p-values corrected for all that were measured (Holm 1979)."""
+    found = list(family)
+    tested = sorted((k for k, o in enumerate(found) if o.p is not None), key=lambda k: _p(found[k]))
+    reached = 0.0
+    for place, k in enumerate(tested):
+        reached = max(reached, min(1.0, (len(tested) - place) * _p(found[k])))
+        found[k] = replace(found[k], p_holm=reached)
+    return found
+
+
 def orderings(
-    setups: Mapping[str, Runs], watched: Sequence[EpisodeRow], failing: str = PAPER_SET
+    setups: Mapping[str, Runs],
+    watched: Watches,
+    failing: str = PAPER_SET,
+    on: str = "irreversible",
 ) -> list[Ordering]:
-    """Every ordering of the paper.
+    """Every ordering of the paper: one family.
 
     Args:
         setups: runs by strategy.
-        watched: runs that detectors watched.
-        failing: set of the failing runs that detectors are compared on.
+        watched: runs that judges watched.
+        failing: set of the failing runs that judges are compared on, or `ALL`.
+        on: the set that strategies are compared on, or `ALL`.
     """
     chain = (PROACTIVE, ONLINE, POST_HOC, NO_STRATEGY)
     found = [
-        strategies_differ("strategies", setups, better, worse, "irreversible")
+        strategies_differ("strategies", setups, better, worse, on)
         for better, worse in pairwise(chain)
     ]
     found += [
-        detectors_differ("detectors", watched, FULL, other, measure, failing)
+        judges_differ("detectors", watched, FULL, other, measure, failing)
         for measure in EQUAL_FALSE_ALARMS
         for other in OTHER_DETECTORS
     ]
@@ -147,68 +178,73 @@ def orderings(
             for other in ABLATIONS.values()
         ]
     found += [
-        detectors_differ("ablations", watched, FULL, other, measure, failing)
+        judges_differ("ablations", watched, FULL, other, measure, failing)
         for measure in EQUAL_FALSE_ALARMS
         for other in ABLATIONS.values()
     ]
     without = f"{PROACTIVE}, without reasoning"
     found += [
         strategies_differ("reasoning", setups, PROACTIVE, without, of)
-        for of in (PAPER_SET, "irreversible")
+        for of in dict.fromkeys((failing, on))
     ]
-    return found
+    return holm(found)
 
 
 def strategies_differ(
     topic: str, setups: Mapping[str, Runs], better: str, worse: str, of: str
 ) -> Ordering:
-    """Success of two strategies on the cases of a set that both were run on."""
-    measure = f"success on the {of} set"
+    """Success of two strategies on the cases of a set that both were run on.
+
+    Its p is the larger of McNemar's, for which cases are independent, and the bootstrap's.
+    """
+    measure = "success on all sets" if of == ALL else f"success on the {of} set"
     first, second = setups.get(better, {}), setups.get(worse, {})
     pair = compared(first, second, of)
     if pair.difference.value is None:
         return Ordering(topic, better, worse, measure, None, None, NOTHING)
     rates = [
-        outcome_metrics(of_set({c: r for c, r in runs.items() if c in other}, of))["success"].value
+        float(np.mean([succeeded(r) for r in of_set({c: runs[c] for c in runs if c in other}, of)]))
         for runs, other in ((first, second), (second, first))
     ]
-    return Ordering(topic, better, worse, measure, rates[0], rates[1], pair.difference)
+    known = [p for p in (pair.p, pair.difference.p) if p is not None]
+    p = max(known) if pair.difference.low is not None else None
+    one, other = rates
+    return Ordering(topic, better, worse, measure, one, other, pair.difference, p)
 
 
-def detectors_differ(
+def judges_differ(
     topic: str,
-    watched: Sequence[EpisodeRow],
-    better: str,
-    worse: str,
+    watched: Watches,
+    better: str | Together,
+    worse: str | Together,
     measure: str,
     failing: str = PAPER_SET,
 ) -> Ordering:
-    """Two detectors at equal false-alarm rates, undisturbed and harmless runs as negatives."""
-    rows = _both(watched, better, worse)
-    one, other = (sample(rows, d, "all", failing) for d in (better, worse))
-    if not one.complete:
-        return Ordering(topic, better, worse, measure, None, None, NOTHING)
-    rate = EQUAL_FALSE_ALARMS[measure]
-    a, b = (auroc(s) if rate is None else detection_at(s, rate) for s in (one, other))
+    """Two judges at equal false-alarm rates, on runs that both watched."""
+    one, other = _name(better), _name(worse)
+    if not _known(watched, better) or not _known(watched, worse):
+        return Ordering(topic, one, other, measure, None, None, NOTHING)
+    rate, in_time = EQUAL_FALSE_ALARMS[measure]
+    lines = [Line.by(watched, judge) for judge in (better, worse)]
+    both = lines[0].seen_by & lines[1].seen_by
+    samples = [sample(replace(x, seen_by=both), ALL, failing, in_time) for x in lines]
+    if not samples[0].complete:
+        return Ordering(topic, one, other, measure, None, None, NOTHING)
+    a, b = (auroc(s) if rate is None else detection_at(s, rate) for s in samples)
 
     def difference(w: Floats) -> Floats:
         return a(w) - b(w)
 
-    ones = np.ones((1, len(one.scenes)))
-    return Ordering(
-        topic,
-        better,
-        worse,
-        measure,
-        float(a(ones)[0]),
-        float(b(ones)[0]),
-        bootstrap(difference, one.scenes),
-    )
+    ones = np.ones((1, len(watched)))
+    count = int(samples[0].counted.sum())
+    found = bootstrap(difference, watched.clusters, count, differ=True)
+    values = float(a(ones)[0]), float(b(ones)[0])
+    return Ordering(topic, one, other, measure, *values, found, found.p)
 
 
 def rates_differ(
     topic: str,
-    watched: Sequence[EpisodeRow],
+    watched: Watches,
     better: str,
     worse: str,
     thresholds: Sequence[float],
@@ -217,32 +253,44 @@ def rates_differ(
     """Detection rates as the paper counts them, whatever the false alarms."""
     at = "0.90" if len(thresholds) == 1 else "three thresholds, on average"
     measure = f"detection as the paper counts it (at {at}, false alarms left aside)"
-    rows = [r for r in _both(watched, better, worse) if r.set == failing]
-    first, second = (
-        [a.share() for a in at_thresholds(rows, d, thresholds)] for d in (better, worse)
-    )
-    if not rows:
+    if not {better, worse} <= set(watched.names):
         return Ordering(topic, better, worse, measure, None, None, NOTHING)
-    difference = mean(
-        [a - b for a, b in zip(first, second, strict=True)], [scene_of(r) for r in rows]
-    )
-    return Ordering(
-        topic,
-        better,
-        worse,
-        measure,
-        float(np.mean(first)),
-        float(np.mean(second)),
-        difference,
-    )
+    alarms = {d: at_thresholds(watched, d, thresholds) for d in (better, worse)}
+    where = watched.of_set(failing) & alarms[better].seen_by & alarms[worse].seen_by
+    shares = {d: a.share() for d, a in alarms.items()}
+    return shares_differ(topic, watched, (better, worse), measure, shares, where)
 
 
-def _both(rows: Sequence[EpisodeRow], *names: str) -> list[EpisodeRow]:
-    """Runs that every one of the detectors watched."""
-    known = {d for r in rows for j in r.judged for d in j.scores}
-    if not known.issuperset(names):
-        return []
-    return [r for r in rows if all(scores(r, d) is not None for d in names)]
+def shares_differ(
+    topic: str,
+    watched: Watches,
+    pair: tuple[str, str],
+    measure: str,
+    shares: Mapping[str, Floats],
+    where: Floats | np.ndarray,
+) -> Ordering:
+    """Two shares of the same runs, such as those with an alarm in time."""
+    if not where.any():
+        return Ordering(topic, *pair, measure, None, None, NOTHING)
+    ratios = {d: Ratio(shares[d] * where, where.astype(float), whole=False) for d in pair}
+    mixed = {"difference": {pair[0]: 1.0, pair[1]: -1.0}}
+    found = measured(ratios, watched.clusters, mixed)
+    first, second = (found[d].value for d in pair)
+    difference = found["difference"]
+    return Ordering(topic, *pair, measure, first, second, difference, difference.p)
+
+
+def _known(watched: Watches, judge: str | Together) -> bool:
+    parts = {judge} if isinstance(judge, str) else {judge.first, judge.second}
+    return parts <= set(watched.names)
+
+
+def _name(judge: str | Together) -> str:
+    return judge if isinstance(judge, str) else judge.name
+
+
+def _p(of: Ordering) -> float:
+    return 1.0 if of.p is None else of.p
 
 
 def _percent(value: float) -> str:

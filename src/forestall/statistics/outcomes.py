@@ -1,55 +1,58 @@
 """What came of runs with a strategy: success, harm, time, effort, and differences on equal cases.
 
-Calls: `summary`, `orderings` → here → `intervals`. A run that broke off counts as failed, not as
+Calls: `profile`, `orderings` → here → `intervals`. A run that broke off counts as failed, not as
 prevented, whatever else its row says; it is never left out. A watched run is one without
-intervention: what its detectors cost is not counted as the time of a robot that has none.
+intervention: what its judges cost is not counted as the time of a robot that has none.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from forestall.statistics.cases import CASE_SETS, Case
-from forestall.statistics.intervals import Metric, Paired, mean, paired, proportion
-from forestall.statistics.metrics import WATCH, canonical, case_of, scene_of
-from forestall.statistics.rows import EpisodeRow
+import numpy as np
+
+from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case
+from forestall.statistics.intervals import Clusters, Metric, Ratio, mean, measured
+from forestall.statistics.judges import PLAN_CHECK, PRIMARY
+from forestall.statistics.pairs import Paired, paired
+from forestall.statistics.rows import EXACT, NOBODY, PLAIN, EpisodeRow, Setup
+from forestall.statistics.watches import ALL, WATCH, canonical, case_of, unit_of
 
 NO_STRATEGY, POST_HOC, ONLINE, PROACTIVE = "none", "post-hoc", "online", "proactive"
+RETRY = "retry-once"
 STRATEGIES = (PROACTIVE, ONLINE, POST_HOC, NO_STRATEGY)
 """In the order of the paper's Table 1, best first."""
 
-DETECTOR = "scene-graph"
+SIMPLE = (*STRATEGIES[:-1], "online-scene", PLAN_CHECK, RETRY, NO_STRATEGY)
+"""Strategies by name alone, as they stand in tables."""
+
+DETECTOR = PRIMARY
 THRESHOLD = 0.9
 """What a strategy runs with unless its name says otherwise."""
 
 ERROR, HELD, STOPPED = "error", "held", "stopped safely"
 
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """A strategy as it was run."""
-
-    strategy: str
-    detector: str = DETECTOR
-    threshold: float = THRESHOLD
-    without: str | None = None
-
-    @property
-    def name(self) -> str:
-        """The strategy, with what differs from the defaults behind it."""
-        parts = [self.strategy]
-        if self.detector != DETECTOR:
-            parts.append(f"detector {self.detector}")
-        if self.threshold != THRESHOLD:
-            parts.append(f"threshold {self.threshold:.4g}")
-        if self.without is not None:
-            parts.append(f"without {self.without}")
-        return ", ".join(parts)
-
-
 Runs = Mapping[Case, EpisodeRow]
 """One run of each case, in a fixed order."""
+
+
+def name_of(setup: Setup) -> str:
+    """The strategy, with what differs from the defaults behind it."""
+    parts = [setup.strategy]
+    if setup.detector != DETECTOR:
+        parts.append(f"detector {setup.detector}")
+    if setup.threshold != THRESHOLD:
+        parts.append(f"threshold {setup.threshold:.4g}")
+    if setup.without is not None:
+        parts.append(f"without {setup.without}")
+    if setup.model != EXACT:
+        parts.append(f"{setup.model} model")
+    if setup.demonstrations != PLAIN:
+        told = setup.demonstrations
+        parts.append(f"{'no' if told == 'none' else told} demonstrations")
+    return ", ".join(parts)
 
 
 def by_setup(rows: Iterable[EpisodeRow]) -> dict[str, dict[Case, EpisodeRow]]:
@@ -57,22 +60,29 @@ def by_setup(rows: Iterable[EpisodeRow]) -> dict[str, dict[Case, EpisodeRow]]:
 
     A run without intervention may be there both plain and watched; the plain one counts. Detector
     and threshold of a run without intervention, after the whole plan or after a subtask are part of
-    the name only where the strategy was run with several.
+    the name only where the strategy was run with several; demonstrations, where it was run with
+    several numbers of them.
+
+    Args:
+        rows: of one profile.
     """
     groups: dict[Setup, dict[Case, EpisodeRow]] = {}
     for row in canonical(rows):
-        if row.strategy in (WATCH, NO_STRATEGY):
-            found = groups.setdefault(Setup(NO_STRATEGY), {})
-            if row.strategy == NO_STRATEGY:
-                found[case_of(row)] = row
-            else:
-                found.setdefault(case_of(row), _unwatched(row))
-            continue
-        setup = Setup(row.strategy, row.detector, row.threshold, row.without)
-        groups.setdefault(setup, {})[case_of(row)] = row
-    named = {_name(s, groups): dict(sorted(runs.items(), key=_case)) for s, runs in groups.items()}
-    plain = [s for s in STRATEGIES if s in named]
-    return {name: named[name] for name in [*plain, *sorted(set(named) - set(plain))]}
+        setup = row.setup
+        if row.strategy in NOBODY:
+            name = NO_STRATEGY if row.strategy == WATCH else row.strategy
+            setup = Setup(name, DETECTOR, THRESHOLD)
+        found = groups.setdefault(setup, {})
+        if row.strategy == WATCH:
+            found.setdefault(case_of(row), _unwatched(row))
+        else:
+            found[case_of(row)] = row
+    plain = _plain_demonstrations(groups)
+    named: dict[str, dict[Case, EpisodeRow]] = {}
+    for setup, runs in groups.items():
+        named[_name(setup, groups, plain)] = dict(sorted(runs.items(), key=_case))
+    first = [s for s in STRATEGIES if s in named]
+    return {name: named[name] for name in [*first, *sorted(set(named) - set(first))]}
 
 
 def succeeded(row: EpisodeRow) -> bool:
@@ -93,46 +103,48 @@ def outcome_metrics(runs: Sequence[EpisodeRow]) -> dict[str, Metric]:
     off have no time, and runs that were not executed, since they must be the watched ones, have no
     computing time where somebody judges.
     """
-    timed = [r for r in runs if r.end != ERROR and not (r.implied and r.strategy != NO_STRATEGY)]
-    good = [r for r in timed if succeeded(r)]
-    has_weak = {r.task for r in runs if r.weak_success is not None}
-    weak = [r for r in runs if r.weak_success is not None or r.task in has_weak]
-    return {
-        "success": proportion([succeeded(r) for r in runs]),
-        "weak_success": proportion([bool(r.weak_success) and r.end != ERROR for r in weak]),
-        "prevented": proportion([prevented(r) for r in runs]),
-        "errors": proportion([r.end == ERROR for r in runs]),
-        "stopped": proportion([r.end == STOPPED for r in runs]),
-        "held": proportion([r.end == HELD for r in runs]),
-        "replanned": proportion([r.replans > 0 for r in runs]),
-        "simulated_s": _mean(timed, lambda r: r.simulated_s),
-        "simulated_s_successful": _mean(good, lambda r: r.simulated_s),
-        "reasoning_s": _mean(timed, lambda r: r.reasoning_s),
-        "reasoning_s_successful": _mean(good, lambda r: r.reasoning_s),
-        "tet_s": _mean(timed, lambda r: r.simulated_s + r.reasoning_s),
-        "tet_s_successful": _mean(good, lambda r: r.simulated_s + r.reasoning_s),
-        "replans": _mean(runs, lambda r: r.replans),
-        "not_judged": _mean(runs, lambda r: r.not_judged),
-        "planner_calls": _mean(runs, lambda r: r.planner_calls),
-        "model_calls": _mean(runs, lambda r: r.model_calls),
+    every = np.ones(len(runs), bool)
+    timed = _where(runs, lambda r: r.end != ERROR and not (r.implied and r.strategy not in NOBODY))
+    good = timed & _where(runs, succeeded)
+    tasks = {r.task for r in runs if r.weak_success is not None}
+    weak = _where(runs, lambda r: r.task in tasks)
+    shares: dict[str, tuple[Callable[[EpisodeRow], bool], np.ndarray]] = {
+        "success": (succeeded, every),
+        "weak_success": (lambda r: bool(r.weak_success) and r.end != ERROR, weak),
+        "prevented": (prevented, every),
+        "errors": (lambda r: r.end == ERROR, every),
+        "stopped": (lambda r: r.end == STOPPED, every),
+        "held": (lambda r: r.end == HELD, every),
+        "replanned": (lambda r: r.replans > 0, every),
     }
+    means: dict[str, tuple[Callable[[EpisodeRow], float], np.ndarray]] = {
+        "replans": (lambda r: r.replans, every),
+        "not_judged": (lambda r: r.not_judged, every),
+        "planner_calls": (lambda r: r.planner_calls, every),
+        "model_calls": (lambda r: r.model_calls, every),
+    }
+    for name, of in (("simulated_s", _robot_s), ("reasoning_s", _own_s), ("tet_s", _total_s)):
+        means |= {name: (of, timed), f"{name}_successful": (of, good)}
+    ratios = {n: _ratio(runs, what, where, True) for n, (what, where) in shares.items()}
+    ratios |= {n: _ratio(runs, what, where, False) for n, (what, where) in means.items()}
+    return measured(ratios, Clusters.of([unit_of(r) for r in runs]))
 
 
 def mean_over(runs: Sequence[Sequence[EpisodeRow]]) -> Metric:
     """Mean success over several runs of each case, such as those at several thresholds."""
     shares = [sum(succeeded(r) for r in several) / len(several) for several in runs]
-    return mean(shares, [scene_of(several[0]) for several in runs])
+    return mean(shares, [unit_of(several[0]) for several in runs])
 
 
 def of_set(runs: Runs, name: str) -> list[EpisodeRow]:
-    """The runs of one set of cases."""
-    return [r for case, r in runs.items() if case.set == name]
+    """The runs of one set of cases, or of `ALL`."""
+    return [r for case, r in runs.items() if name in (ALL, case.set)]
 
 
 def sets_of(runs: Runs) -> tuple[str, ...]:
     """Which sets of cases there are, known ones first."""
-    found = {case.set for case in runs}
-    return (*(s for s in CASE_SETS if s in found), *sorted(found - set(CASE_SETS)))
+    known, found = (*CASE_SETS, *FURTHER_SETS), {case.set for case in runs}
+    return (*(s for s in known if s in found), *sorted(found - set(known)))
 
 
 def compared(
@@ -141,34 +153,125 @@ def compared(
     of: str,
     what: Callable[[EpisodeRow], bool] = succeeded,
 ) -> Paired:
-    """How two strategies differ on the cases of one set that both were run on."""
-    both = [case for case in first if case in second and case.set == of]
+    """How two strategies differ on the cases of one set, or `ALL`, that both were run on."""
+    both = [case for case in first if case in second and of in (ALL, case.set)]
     return paired(
         [what(first[c]) for c in both],
         [what(second[c]) for c in both],
-        [scene_of(first[c]) for c in both],
+        [unit_of(first[c]) for c in both],
     )
 
 
-def _name(setup: Setup, groups: Iterable[Setup]) -> str:
+def time_between(first: Runs, second: Runs, of: str) -> Metric:
+    """Robot time of one strategy minus that of another on the cases that both were run on."""
+    both = [c for c in first if c in second and of in (ALL, c.set)]
+    kept = [c for c in both if ERROR not in _ends(first, second, c)]
+    more = [first[c].simulated_s - second[c].simulated_s for c in kept]
+    return mean(more, [unit_of(first[c]) for c in kept])
+
+
+def shared_cases(setups: Mapping[str, Runs]) -> frozenset[Case]:
+    """Cases that every strategy of the paper, the plan check and the retry were run on.
+
+    Those of them that were run at all; without a case that they share, none.
+    """
+    there = [frozenset(setups[name]) for name in SIMPLE if name in setups]
+    return frozenset.intersection(*there) if there else frozenset()
+
+
+def harm_prevented(runs: Runs, base: Runs) -> Metric:
+    """Of the cases in which the base does harm that cannot be undone: those without it here."""
+    harmed = [c for c in runs if c in base and base[c].harmed]
+    hits = [prevented(runs[c]) for c in harmed]
+    ratio = Ratio(np.array(hits, float), np.ones(len(harmed)))
+    return measured({"": ratio}, Clusters.of([unit_of(runs[c]) for c in harmed]))[""]
+
+
+def false_alarm_cost(runs: Runs, base: Runs, calm: Runs) -> dict[str, Metric]:
+    """What a strategy costs where nobody is needed, on cases in which `calm` succeeds.
+
+    Args:
+        runs: with the strategy.
+        base: what it is compared with: nobody, or a robot that tries again.
+        calm: runs without intervention.
+
+    Returns:
+        `seconds`, robot time more than the base; `success`, the difference; `changed`, runs whose
+        plan was changed; `seconds_changed`, robot time more in those.
+    """
+    there = [
+        c
+        for c in runs
+        if c in base and c in calm and succeeded(calm[c]) and ERROR not in _ends(runs, base, c)
+    ]
+    more = np.array([runs[c].simulated_s - base[c].simulated_s for c in there], float)
+    gain = np.array([float(succeeded(runs[c])) - succeeded(base[c]) for c in there], float)
+    changed = np.array([runs[c].replans > 0 for c in there], float)
+    one = np.ones(len(there))
+    ratios = {
+        "seconds": Ratio(more, one, whole=False, free=True),
+        "success": Ratio(gain, one, whole=False, free=True),
+        "changed": Ratio(changed, one),
+        "seconds_changed": Ratio(more * changed, changed, whole=False, free=True),
+    }
+    return measured(ratios, Clusters.of([unit_of(runs[c]) for c in there]))
+
+
+def _ends(runs: Runs, base: Runs, case: Case) -> tuple[str, str]:
+    return runs[case].end, base[case].end
+
+
+def _plain_demonstrations(groups: Iterable[Setup]) -> dict[str, str]:
+    """Strategy → the demonstrations that its name does not mention."""
+    counts: dict[str, Counter[str]] = {}
+    for setup in groups:
+        counts.setdefault(setup.strategy, Counter())[setup.demonstrations] += 1
+    return {
+        strategy: PLAIN if PLAIN in found else min(found, key=lambda d: (-found[d], d))
+        for strategy, found in counts.items()
+    }
+
+
+def _name(setup: Setup, groups: Iterable[Setup], plain: Mapping[str, str]) -> str:
     """Short where the strategy was not run with several detectors or thresholds."""
     kin = {(s.detector, s.threshold) for s in groups if s.strategy == setup.strategy}
     if setup.strategy != PROACTIVE and len(kin) == 1:
-        return replace(setup, detector=DETECTOR, threshold=THRESHOLD).name
-    return setup.name
+        setup = replace(setup, detector=DETECTOR, threshold=THRESHOLD)
+    if setup.demonstrations == plain[setup.strategy]:
+        setup = replace(setup, demonstrations=PLAIN)
+    return name_of(setup)
 
 
 def _unwatched(row: EpisodeRow) -> EpisodeRow:
     return replace(row, reasoning_s=0.0, planner_calls=0, model_calls=0, replans=0)
 
 
-def _mean(runs: Sequence[EpisodeRow], what: Callable[[EpisodeRow], float]) -> Metric:
-    return mean([what(r) for r in runs], [scene_of(r) for r in runs])
+def _robot_s(row: EpisodeRow) -> float:
+    return row.simulated_s
 
 
-def _key(case: Case) -> tuple[str, str, str, int]:
-    return case.set, case.task, case.scenario or "", case.seed
+def _own_s(row: EpisodeRow) -> float:
+    return row.reasoning_s
+
+
+def _total_s(row: EpisodeRow) -> float:
+    return row.simulated_s + row.reasoning_s
+
+
+def _where(runs: Sequence[EpisodeRow], rule: Callable[[EpisodeRow], bool]) -> np.ndarray:
+    return np.array([rule(r) for r in runs], bool)
+
+
+def _ratio(
+    runs: Sequence[EpisodeRow],
+    what: Callable[[EpisodeRow], float],
+    where: np.ndarray,
+    whole: bool,
+) -> Ratio:
+    values = np.array([float(what(r)) for r in runs], float)
+    return Ratio(values * where, where.astype(float), whole=whole, free=not whole)
 
 
 def _case(item: tuple[Case, EpisodeRow]) -> tuple[str, str, str, int]:
-    return _key(item[0])
+    case = item[0]
+    return case.set, case.task, case.scenario or "", case.seed

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from forestall.statistics.cases import UNDISTURBED
-from forestall.statistics.metrics import HARMLESS
+from forestall.statistics.watches import HARMLESS
 
 PERCENT, SECONDS = "%", "s"
 DETECTOR, STRATEGY, THRESHOLDS = "detectors", "strategies", "success_over_thresholds"

@@ -9,6 +9,7 @@ not measured is a dash.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from forestall.statistics.cases import UNDISTURBED
@@ -23,47 +24,61 @@ from forestall.statistics.cells import (
     cells,
     heads,
     mean,
+    number,
     points,
     probability,
     seconds,
     share,
     shown,
 )
-from forestall.statistics.metrics import HARMLESS, THRESHOLDS, TRIVIAL
+from forestall.statistics.further_tables import compared_table, further_tables
+from forestall.statistics.judges import THRESHOLDS, is_variant
+from forestall.statistics.metrics import TRIVIAL
 from forestall.statistics.outcomes import PROACTIVE
 from forestall.statistics.paper import ABLATIONS, FULL, PERCENT
+from forestall.statistics.sentences import told
+from forestall.statistics.side_by_side import side_by_side
+from forestall.statistics.watches import ALL, HARMLESS
 
 _SUFFIXES = (*(f"{t:.2f}" for t in THRESHOLDS), "mean")
 
 
 def tables(summary: Mapping[str, Any], names: Names | None = None) -> tuple[Table, ...]:
-    """Every table of a summary, those without measured time first.
+    """Every table of a summary: what both households say, then those of the one shown first.
 
     Args:
         summary: of `summary.summary`, or read from its file.
-        names: what is shown in place of a detector's name; the summary's own by default.
+        names: what is shown in place of a judge's name; the summary's own by default.
     """
     names = summary["names"] if names is None else names
+    first = summary["shown"]
     notes = [f"{DASH}: not measured.", *(f"{n}." for n in summary["episodes"]["notes"])]
-    by_set = summary["detectors_by_set"]
-    found = [
-        _strategies(summary, names),
-        _harm(summary, names),
-        *(_detectors(of, found, summary, names) for of, found in by_set.items()),
+    found = [told(summary), side_by_side(summary, names)]
+    for profile, content in summary["profiles"].items():
+        made = of_profile(content, names)
+        found += made if profile == first else [t.of(profile) for t in made]
+    found.sort(key=lambda t: t.timed)
+    return tuple(replace(t, note=" ".join(filter(None, [t.note, *notes]))) for t in found)
+
+
+def of_profile(content: Mapping[str, Any], names: Names) -> list[Table]:
+    """Every table of one household, those without measured time first."""
+    by_set = content["detectors_by_set"]
+    return [
+        _strategies(content, names),
+        _harm(content, names),
+        *further_tables(content, names),
+        *(_detectors(of, found, content, names) for of, found in by_set.items()),
         *(_sweep(of, found, names) for of, found in by_set.items()),
-        _ablation(summary, names),
-        _parts(summary, names),
+        _ablation(content, names),
+        _parts(content, names),
         *(_trivial(of, found, names) for of, found in by_set.items()),
-        *(t for key in ("kind", "task", "knowable") for t in _split(summary, key, names)),
-        _paper(summary, names, timed=False),
-        _orderings(summary, names),
-        _times(summary, names),
-        _paper(summary, names, timed=True),
+        *(t for key in ("set", "kind", "task", "knowable") for t in _split(content, key, names)),
+        _paper(content, names, timed=False),
+        _orderings(content, names),
+        _times(content, names),
+        _paper(content, names, timed=True),
     ]
-    return tuple(
-        Table(t.name, t.title, t.header, t.rows, " ".join(filter(None, [t.note, *notes])), t.timed)
-        for t in found
-    )
 
 
 _OUTCOMES: Columns = (
@@ -97,9 +112,9 @@ _DETECTED: Columns = (
     ("detected after it could be known", "after_known", share),
 )
 _FALSE: Columns = tuple(
-    (f"false alarms per {per}, {of}", f"false_alarms_per_{per}_{of}", share)
-    for per in ("run", "boundary")
-    for of in (UNDISTURBED, HARMLESS)
+    (f"false alarms per {per}, {of}", f"false_alarms_per_{per}_{of}", form)
+    for per, form in (("run", share), ("boundary", share), ("hour", mean))
+    for of in (UNDISTURBED, HARMLESS, ALL)
 )
 _POINT: Columns = (
     *_DETECTED,
@@ -110,12 +125,18 @@ _POINT: Columns = (
     ("balanced accuracy, all", "balanced_accuracy_all", share),
     ("lead, subtasks", "lead_subtasks", mean),
     ("lead, robot time", "lead_s", seconds),
+    ("cause named right", "cause_right", share),
+    ("the very fact named", "cause_exact", share),
+    ("in time by chance at as many false alarms", "chance_in_time", number(".3f")),
+    ("more than chance in time", "over_chance", points),
 )
 
 
 def _swept(negatives: str) -> Columns:
     return (
         ("AUROC", f"auroc_{negatives}", area),
+        ("AUROC in time", f"auroc_in_time_{negatives}", area),
+        ("AUROC of boundaries", "auroc_boundary", area),
         ("average precision", f"average_precision_{negatives}", area),
         *(
             (
@@ -165,13 +186,13 @@ def _detectors(
     over = summary["success_over_thresholds"] if of == "robofail" else {}
     rows = []
     for name in _main(found):
-        for suffix in _SUFFIXES if _swept_one(found[name]) else ("",):
+        for suffix in _SUFFIXES if _with_thresholds(found[name]) else ("",):
             success = over.get(name, {}).get(f"success@{suffix}", EMPTY)
             values = cells(found[name], _POINT, suffix)
             rows.append((shown(name, names), suffix or DASH, *values, share(success)))
     return Table(
         f"detectors-{of}",
-        f"Detectors on the same observations, failing runs of the {of} set (the paper's Fig. 8a)",
+        f"Judges on the same observations, {_failing(of)} (the paper's Fig. 8a)",
         ("detector", "threshold", *heads(_POINT), "success of the proactive strategy"),
         tuple(rows),
         '"mean" is over the three thresholds, as the paper reports it.',
@@ -188,7 +209,7 @@ def _sweep(of: str, found: Mapping[str, Any], names: Names) -> Table:
     ]
     return Table(
         f"sweep-{of}",
-        f"Detectors at equal false-alarm rates, failing runs of the {of} set",
+        f"Judges at equal false-alarm rates, {_failing(of)}",
         ("detector", "false alarms counted on", *heads(_swept("all"))),
         tuple(rows),
         "A false-alarm rate is a share of runs; the threshold is the best that keeps to it on these"
@@ -212,8 +233,8 @@ def _ablation(summary: Mapping[str, Any], names: Names) -> Table:
     ]
     return Table(
         "ablation-score",
-        f"Parts of the score left out, failing runs of the {summary['detection_set']} set "
-        "(the paper's Table 2, left)",
+        f"Parts of the score left out, {_failing(summary['detection_set'])} (the paper's Table 2, "
+        "left)",
         ("score", *heads(columns)),
         tuple(rows),
         "A score that alarms more often detects more; the last columns compare at equal"
@@ -238,15 +259,16 @@ def _parts(summary: Mapping[str, Any], names: Names) -> Table:
 def _trivial(of: str, found: Mapping[str, Any], names: Names) -> Table:
     rows = []
     for name in (*_main(found), *(t for t in TRIVIAL if t in found)):
-        suffix = "0.90" if _swept_one(found[name]) else ""
+        suffix = "0.90" if _with_thresholds(found[name]) else ""
         text = f"{shown(name, names)}, threshold 0.90" if suffix else shown(name, names)
         rows.append((text, *cells(found[name], _POINT, suffix)))
     return Table(
         f"trivial-{of}",
-        f"Beside detectors that cost nothing, and the truth; failing runs of the {of} set",
+        f"Beside judges that cost nothing, and the truth; {_failing(of)}",
         ("detector", *heads(_POINT)),
         tuple(rows),
-        '"random" alarms as often as the primary detector; "true plan check" asks the simulator.',
+        '"random" has as many false alarms per boundary as the primary judge; "true plan check" '
+        "asks the simulator.",
     )
 
 
@@ -259,12 +281,11 @@ def _split(summary: Mapping[str, Any], key: str, names: Names) -> Iterable[Table
                 outcomes.append((*begin, *cells(metrics, _OUTCOMES)))
             for name, metrics in groups["detectors"].items():
                 begin = (of, value, shown(name, names))
-                if of in (UNDISTURBED, HARMLESS):
-                    per = [(h, f"{m}_{of}", f) for h, m, f in _PER]
-                    false.append((*begin, *cells(metrics, per)))
-                else:
+                if metrics["fdr"]["n"]:
                     detected.append((*begin, *cells(metrics, _DETECTED)))
-    title = {"kind": "kind", "task": "task", "knowable": "how it can be known"}[key]
+                if metrics["false_alarms_per_run_all"]["n"]:
+                    false.append((*begin, *cells(metrics, _PER)))
+    title = {"kind": "kind", "task": "task", "knowable": "how it can be known", "set": "its set"}
     for name, what, columns, rows in (
         ("strategies", "Strategies", _OUTCOMES, outcomes),
         ("detection", "Detection", _DETECTED, detected),
@@ -272,13 +293,14 @@ def _split(summary: Mapping[str, Any], key: str, names: Names) -> Iterable[Table
     ):
         if rows or name != "false-alarms":
             who = "strategy" if name == "strategies" else "detector"
-            header = ("set", title, who, *heads(columns))
-            yield Table(f"{name}-by-{key}", f"{what} by {title}", header, tuple(rows))
+            header = ("set", title[key], who, *heads(columns))
+            yield Table(f"{name}-by-{key}", f"{what} by {title[key]}", header, tuple(rows))
 
 
 _PER: Columns = (
-    ("false alarms per run", "false_alarms_per_run", share),
-    ("false alarms per boundary", "false_alarms_per_boundary", share),
+    ("false alarms per run", "false_alarms_per_run_all", share),
+    ("false alarms per faultless boundary", "false_alarms_per_boundary_all", share),
+    ("false alarms per hour", "false_alarms_per_hour_all", mean),
 )
 
 
@@ -313,35 +335,7 @@ _GOOD = (UNDISTURBED, HARMLESS)
 
 
 def _orderings(summary: Mapping[str, Any], names: Names) -> Table:
-    rows = [
-        (
-            o["topic"],
-            o["measure"],
-            shown(o["better"], names),
-            shown(o["worse"], names),
-            DASH if o["first"] is None else f"{100 * o['first']:.1f} %",
-            DASH if o["second"] is None else f"{100 * o['second']:.1f} %",
-            points(o["difference"]),
-            o["verdict"],
-        )
-        for o in summary["orderings"]
-    ]
-    return Table(
-        "orderings",
-        "The paper's orderings",
-        (
-            "about",
-            "measure",
-            "should be better",
-            "than",
-            "first",
-            "second",
-            "difference",
-            "verdict",
-        ),
-        tuple(rows),
-        "An ordering holds when the interval of the difference on the same runs lies above 0.",
-    )
+    return compared_table("orderings", "The paper's orderings", summary["orderings"], names)
 
 
 def _times(summary: Mapping[str, Any], names: Names) -> Table:
@@ -367,12 +361,21 @@ def _by_set(found: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any]
 
 def _main(found: Mapping[str, Any]) -> list[str]:
     """Detectors that are no ablations of the score, the paper's first, and no trivial ones."""
-    names = [n for n in found if n not in TRIVIAL and n not in ABLATIONS.values()]
+    out = {*TRIVIAL, *ABLATIONS.values()}
+    names = [n for n in found if n not in out and not is_variant(n)]
     return sorted(names, key=lambda n: (n != FULL, not n.startswith(FULL), n))
 
 
 def _swept_one(metrics: Mapping[str, Any]) -> bool:
     return "auroc_all" in metrics
+
+
+def _with_thresholds(metrics: Mapping[str, Any]) -> bool:
+    return f"fdr@{THRESHOLDS[0]:.2f}" in metrics
+
+
+def _failing(of: str) -> str:
+    return "all failing runs" if of == ALL else f"failing runs of the {of} set"
 
 
 __all__ = ["Table", "tables"]
