@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from forestall.experiments.cost import Cost
     from forestall.statistics.tables import Table
 
-MAIN_TABLES = ("paper",)
+MAIN_TABLES = ("sentences", "side-by-side")
 """Printed; all of them are in the folder."""
 
 Flag = Annotated[bool, Parameter(negative="")]
@@ -40,7 +40,9 @@ class Options:
             judges.
         profiles: of the household: honest (motions go wrong, the domain file does not know all) or
             kind. Honest by default, both for `all`.
-        quick: a tenth of the cases of each set, with the main strategies.
+        part: of the cases of each set in `all`, from all tasks in turn; 1 for every case, which
+            takes hours.
+        quick: a tenth of it.
         demonstrations: of each task in the honest household, each another way to do it (1 to 32).
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes), ray, or inline (this process, one after the other).
@@ -58,6 +60,7 @@ class Options:
     sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     profiles: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
+    part: float = 0.3
     quick: Flag = False
     demonstrations: int = 8
     out: Path | None = None
@@ -133,6 +136,7 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
             tuple(options.sets or ()),
             tuple(options.strategies or ()),
             tuple(options.profiles or ()),
+            options.part,
             options.quick,
             options.demonstrations,
         ),

@@ -257,6 +257,7 @@ class ResultsFolder(Generic[R]):
                 tuple(c.sets),
                 tuple(c.strategies),
                 tuple(c.profiles),
+                c.part,
                 c.quick,
                 c.demonstrations,
             )

@@ -48,11 +48,17 @@ IRREVERSIBLE = "irreversible"
 DEMONSTRATIONS = 8
 """Of each task in the honest household."""
 
-PART = 1 / 4
-"""Of the cases of each set, in the honest household, in which strategies step in."""
+PART = 0.3
+"""Of the cases of each set in "all", so that it ends within an hour on two cores."""
 
-QUICK = 1 / 10
-"""Of the cases of each set in a quick experiment."""
+STEPPING_IN = 0.25
+"""Of these, in the honest household, those in which strategies step in."""
+
+ABLATED = 0.5
+"""Of RoboFail's cases in "all", those that are run without reasoning or validation, too."""
+
+QUICK = 0.1
+"""Of what is run otherwise, in a quick experiment."""
 
 PAPER_DETECTOR = "scene-graph"
 
@@ -156,7 +162,8 @@ class Choice:
         sets: only cases of these; all by default.
         strategies: only these; all by default.
         profiles: of the household; by default the honest one, and for "all" both.
-        quick: a tenth of the cases of each set, and the main strategies alone.
+        part: of the cases of each set in "all", from all tasks in turn: `PART` by default.
+        quick: a tenth of that.
         demonstrations: of each task in the honest household, each another way to do it.
     """
 
@@ -167,6 +174,7 @@ class Choice:
     sets: tuple[str, ...] = ()
     strategies: tuple[str, ...] = ()
     profiles: tuple[str, ...] = ()
+    part: float = PART
     quick: bool = False
     demonstrations: int = DEMONSTRATIONS
 
@@ -215,24 +223,25 @@ def _in(profile: str, choice: Choice) -> Iterator[Run]:
     run = partial(Run, profile=profile, demonstrations=told)
     yield from (run(case, s) for found in of_sets.values() for case in found for s in ALONE)
     if choice.experiment in ("proactive", "all"):
-        for of, found in of_sets.items():
-            for case in _part(found, choice.quick) if honest else found:
-                yield from _stepping_in(case, run, choice.quick and of != IRREVERSIBLE)
+        part = STEPPING_IN if honest and choice.experiment == "all" else 1.0
+        for found in of_sets.values():
+            for case in _some(found, part):
+                yield from _stepping_in(case, run)
     robofail = of_sets[PAPER_SET]
     if choice.experiment == "detection":
         for case, detector in product(robofail, (PAPER_DETECTOR, *BASELINES)):
             yield from (run(case, "proactive", detector, t) for t in THRESHOLDS)
     if choice.experiment == "ablation" or (choice.experiment == "all" and not honest):
-        for case in robofail if choice.experiment == "ablation" else _part(robofail, choice.quick):
+        for case in robofail if choice.experiment == "ablation" else _some(robofail, ABLATED):
             yield run(case, "proactive")
             yield from (run(case, "proactive", without=p) for p in ("reasoning", "validation"))
 
 
-def _stepping_in(case: Case, run: Callable[..., Run], briefly: bool) -> Iterator[Run]:
-    """The strategies that step in, on one case; `briefly`: those before a subtask alone."""
+def _stepping_in(case: Case, run: Callable[..., Run]) -> Iterator[Run]:
+    """The strategies that step in, on one case."""
     yield from (run(case, s) for s in BEFORE)
     honest = run(case, "none").profile == HONEST
-    if not briefly and (honest or case.set == IRREVERSIBLE):
+    if honest or case.set == IRREVERSIBLE:
         yield from (run(case, s) for s in AFTER)
     if honest:
         yield from (run(case, s, model=m) for m in MODELS[1:] for s in BEFORE)
@@ -243,15 +252,18 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
     honest = profile == HONEST
     found = {}
     for of in (*CASE_SETS, *FURTHER_SETS) if honest else CASE_SETS:
-        every = cases(of, choice.split, choice.rounds, further=honest)
-        limit = max(1, round(len(every) * QUICK)) if choice.quick else choice.limit
-        found[of] = _limited(every, limit)
+        every: Sequence[Case] = cases(of, choice.split, choice.rounds, further=honest)
+        if choice.experiment == "all":
+            every = _some(every, choice.part * (QUICK if choice.quick else 1))
+        elif choice.quick:
+            every = _some(every, QUICK)
+        found[of] = _limited(every, choice.limit)
     return found
 
 
-def _part(found: Sequence[Case], quick: bool) -> Sequence[Case]:
-    """A balanced part of the cases of a set: so many of every task."""
-    return found if quick else _limited(found, max(1, round(len(found) * PART)))
+def _some(found: Sequence[Case], part: float) -> Sequence[Case]:
+    """A balanced part of the cases of a set, at least one: so many of every task."""
+    return _limited(found, max(1, round(len(found) * part)))
 
 
 def _check(choice: Choice) -> None:
@@ -259,6 +271,8 @@ def _check(choice: Choice) -> None:
         raise UnknownNameError("experiment", choice.experiment, EXPERIMENTS)
     if choice.limit is not None and choice.limit < 1:
         raise InputError(f"--limit {choice.limit}: at least 1 case of each set is needed")
+    if not 0 < choice.part <= 1:
+        raise InputError(f"--part {choice.part}: give a number above 0, at most 1")
     if not 1 <= choice.demonstrations <= MOST:
         raise InputError(f"--demonstrations {choice.demonstrations}: 1 to {MOST} are possible")
     for name in choice.sets:

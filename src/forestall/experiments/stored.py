@@ -64,6 +64,7 @@ class Chosen(_Model):
     sets: list[str]
     strategies: list[str]
     profiles: list[str]
+    part: float
     quick: bool
     demonstrations: int
 

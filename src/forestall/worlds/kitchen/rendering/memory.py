@@ -8,7 +8,6 @@ from collections.abc import Iterator
 
 from forestall.worlds.kitchen.rendering.drawn import Drawn
 
-
 LEAST_BYTES, MOST_BYTES = 600_000_000, 2_500_000_000
 """Of remembered frames: about 110 and 460 of them."""
 
