@@ -126,7 +126,11 @@ class Disturbance(Protocol):
 
 
 class OpenWorld(Protocol):
-    """One world made for one run, seen from its three sides."""
+    """One world made for one run, seen from its three sides.
+
+    One that also has `shares_names`, False, keeps its names to itself: `tasks/edge.py` lies around
+    what the robot gets.
+    """
 
     @property
     def environment(self) -> Environment:

@@ -1,4 +1,4 @@
-"""The world's edge: no name of the simulator gets in, and commands mean what is where they point."""
+"""The world's edge: the simulator's names stay behind it, and commands mean what is at a place."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def test_the_kitchen_behind_its_edge_conforms() -> None:
     assert check_environment(make, 10_000, plan, DOMAIN) == []
 
 
-# --- the whole loop ---------------------------------------------------------------------------------
+# --- the whole loop ---
 
 
 def _strings(value: object, passed: set[int]) -> Iterator[str]:

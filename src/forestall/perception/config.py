@@ -80,6 +80,8 @@ class PerceptionConfig:
         max_lost: things of one category whose place is lost that are remembered; the last ones.
         max_things: things remembered in all; what has not been observed for longest goes first.
         same_place_m: distance over which an untracked detection is the same object as before.
+        same_surface_share: share of what an untracked view shows of a piece of furniture that must
+            lie on what is known of it, or the other way round, to be the same piece.
     """
 
     min_pixels: int = 20
@@ -127,6 +129,7 @@ class PerceptionConfig:
     interior_share: float = 0.1
     glimpse_share: float = 0.5
     same_place_m: float = 0.3
+    same_surface_share: float = 0.25
     same_share: float = 0.3
     max_lost: int = 5
     max_things: int = 400

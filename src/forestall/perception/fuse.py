@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from dataclasses import replace
+
 import numpy as np
 
 from forestall.domain.model import Domain
@@ -17,6 +19,14 @@ from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.forgetting import let_go, merge_renamed, remove
 from forestall.perception.geometry import Stack, Thing
+from forestall.perception.naming import Known
+from forestall.perception.own_names import (
+    expected,
+    found_again,
+    named_hands,
+    pointed_at,
+    renamed,
+)
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
 from forestall.perception.support import Parent, parents
@@ -58,6 +68,25 @@ class SceneMemory:
         self._relations: list[Relation] = []
         self.forgotten: tuple[str, ...] = ()  # in the newest observation, for want of room
 
+    def named(self, observation: Observation) -> Observation:
+        """An observation whose hands have names for what they hold."""
+        return named_hands(observation, self.tracks, self._held, self._domain)
+
+    def expected(self, observation: Observation) -> dict[str, Known]:
+        """Where everything located is expected, as the hands are now."""
+        return expected(self.tracks, observation.hands, self._riding, self.known)
+
+    def known(self, category: str, points_m: Points, centroid_m: Points) -> Known:
+        """Where a thing of a category is expected of which some points are known."""
+        ground = self._domain.is_a(category, self._domain.roles.ground)
+        return replace(Known.of(points_m, centroid_m, self._is_fixture(category)), only=ground)
+
+    def join(self, parts: Mapping[str, str]) -> None:
+        """Forget what turned out to be a part of something else."""
+        for part, whole in parts.items():
+            if part in self.tracks:
+                remove(self.tracks, part, whole)
+
     # --- integration ----------------------------------------------------------------------------
 
     def integrate(self, observation: Observation, views: Sequence[View]) -> None:
@@ -86,6 +115,11 @@ class SceneMemory:
         self.forgotten = let_go(self.tracks, kept, self._config)
         self._relate(seen, views)
         self._mark(seen, fate, views)
+        guessed = {n for v in views for n in v.guessed if n in seen - was}
+        names = found_again(self.tracks, guessed, self._is_fixture)
+        self._relations = renamed(self._relations, names)
+        told = pointed_at(self.tracks, observation.told, self._domain)
+        self._relations = renamed(self._relations, told)
 
     def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""

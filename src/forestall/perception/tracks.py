@@ -64,6 +64,7 @@ class View:
 
     `features` are None without an image encoder and for what has no cloud. `unlocated` tells what
     is seen and has no place, because no depth returned or the segmenter is not sure of its mask.
+    `guessed` are the ids that perception gave, and no segmenter that tracks.
     """
 
     frame: Frame
@@ -74,6 +75,7 @@ class View:
     states: tuple[Mapping[str, str | None], ...]
     features: tuple[bytes | None, ...]
     unlocated: tuple[bool, ...]
+    guessed: frozenset[str] = frozenset()
 
 
 _MOST_POINTS = 6000

@@ -1,0 +1,174 @@
+"""Names that perception itself gives: to what is felt in the hand, found again, or pointed at.
+
+Called by the perceiver before and by `fuse.py` after an observation is taken in; where a segmenter
+tracks, and the hand knows a name, nothing here changes anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from forestall.domain.model import Domain
+from forestall.perception.forgetting import Tracks
+from forestall.perception.naming import Known, unused
+from forestall.perception.tracks import Track, middle
+from forestall.perception.unproject import Points
+from forestall.types.facts import category_of, is_instance
+from forestall.types.graph import Relation
+from forestall.types.observation import GripperState, Observation, Vec3
+
+_POINTED_M = 0.15
+
+
+def felt(hand: GripperState, tracks: Tracks, former: str | None, domain: Domain) -> GripperState:
+    """A hand with a name for what it holds, where it only knows of which kind that is.
+
+    What it held before, else the nearest thing of the kind, else a new one.
+    """
+    return replace(
+        hand,
+        holding=_felt(hand.holding, hand, tracks, former, domain),
+        released=former if _is_kind(hand.released, former, domain) else hand.released,
+    )
+
+
+def _is_kind(name: str | None, thing: str | None, domain: Domain) -> bool:
+    """Whether a name is the category of a thing and no more."""
+    if name is None or thing is None or is_instance(name):
+        return False
+    return domain.canonical(name) == category_of(thing)
+
+
+def _felt(
+    name: str | None, hand: GripperState, tracks: Tracks, former: str | None, domain: Domain
+) -> str | None:
+    if name is None or is_instance(name) or name in tracks or domain.find(name) is None:
+        return name
+    if _is_kind(name, former, domain):
+        return former
+    category = domain.canonical(name)
+    place = np.asarray(hand.position_world_m)
+    alike = [t for t in tracks.values() if t.category == category]
+    near = min(alike, key=lambda t: (_away(t, place), t.id), default=None)
+    return unused(category, set(tracks)) if near is None else near.id
+
+
+def _away(track: Track, place: Points) -> float:
+    lost = track.points_world_m is None
+    return float("inf") if lost else float(np.linalg.norm(track.centroid_m - place))
+
+
+def expected(
+    tracks: Tracks,
+    hands: Iterable[GripperState],
+    riding: Callable[[str], Collection[str]],
+    of: Callable[[str, Points, Points], Known],
+) -> dict[str, Known]:
+    """Where everything located is expected now.
+
+    What a hand holds or has let go, and what is in or on it, is where the hand says.
+    """
+    known = {
+        name: of(t.category, t.points_world_m, t.centroid_m)
+        for name, t in tracks.items()
+        if t.points_world_m is not None
+    }
+    for hand in hands:
+        for name, place, turning in (
+            (hand.released, hand.released_world_m, False),
+            (hand.holding, hand.position_world_m, True),
+        ):
+            if name is None or place is None or name not in tracks:
+                continue
+            at, track = np.asarray(place, dtype=np.float64), tracks[name]
+            offset = at - middle(track)
+            for rider in riding(name):
+                if rider in known:
+                    known[rider] = Known(known[rider].centroid_m + offset, turning=turning)
+            known[name] = Known(at, turning=turning)
+    return known
+
+
+def found_again(
+    tracks: Tracks, fresh: Collection[str], fixed: Callable[[str], bool]
+) -> dict[str, str]:
+    """New names → those of lost things of their kind that they must be, which they now bear.
+
+    Args:
+        tracks: by name; changed.
+        fresh: named by perception in this observation for the first time.
+        fixed: whether a category does not move.
+    """
+    names: dict[str, str] = {}
+    kinds = {tracks[n].category for n in fresh if n in tracks}
+    for category in sorted(k for k in kinds if not fixed(k)):
+        new = sorted(n for n in fresh if n in tracks and tracks[n].category == category)
+        lost = [
+            t
+            for _, t in sorted(tracks.items())
+            if t.category == category and t.points_world_m is None and not t.vague
+        ]
+        if not lost:
+            continue
+        gaps = [[np.linalg.norm(tracks[n].centroid_m - t.centroid_m) for t in lost] for n in new]
+        for row, column in zip(*linear_sum_assignment(np.array(gaps)), strict=True):
+            names[new[row]] = lost[column].id
+    for name, old in names.items():
+        known = {a: v for a, v in tracks[old].states.items() if v is not None}
+        tracks[name].states = {**known, **tracks[name].states}
+        del tracks[old]
+    _rename(tracks, names)
+    return names
+
+
+def pointed_at(tracks: Tracks, told: Sequence[tuple[str, Vec3]], domain: Domain) -> dict[str, str]:
+    """Names → those that somebody gave to the same things, which they now bear."""
+    names: dict[str, str] = {}
+    for name, point in told:
+        if name in tracks:
+            continue
+        at, category = np.asarray(point), category_of(domain.canonical(name))
+        away = {
+            n: float(np.linalg.norm(np.maximum(np.maximum(t.low_m - at, at - t.high_m), 0.0)))
+            for n, t in sorted(tracks.items())
+            if t.category == category and t.points_world_m is not None and n not in names
+        }
+        nearest = min(
+            away,
+            key=lambda n: (away[n], float(np.linalg.norm(middle(tracks[n]) - at))),
+            default=None,
+        )
+        if nearest is not None and away[nearest] <= _POINTED_M:
+            names[nearest] = name
+    _rename(tracks, names)
+    return names
+
+
+def _rename(tracks: Tracks, names: dict[str, str]) -> None:
+    for old, new in names.items():
+        track = tracks.pop(old)
+        track.id = new
+        tracks[new] = track
+    for track in tracks.values():
+        if track.parent is not None and track.parent[1] in names:
+            track.parent = (track.parent[0], names[track.parent[1]])
+
+
+def renamed(relations: Sequence[Relation], names: dict[str, str]) -> list[Relation]:
+    """Relations in the new names."""
+    return [
+        Relation(names.get(r.subject, r.subject), r.predicate, names.get(r.object, r.object))
+        for r in relations
+    ]
+
+
+def named_hands(
+    observation: Observation, tracks: Tracks, former: str | None, domain: Domain
+) -> Observation:
+    """An observation in which every hand has a name for what it holds."""
+    hands = [felt(h, tracks, former, domain) for h in (observation.gripper, *observation.others)]
+    return replace(observation, gripper=hands[0], others=tuple(hands[1:]))
