@@ -61,11 +61,10 @@ class Known:
             return cls(centroid_m)
         return cls(centroid_m, _cells(points_m), np.ptp(points_m, axis=0))
 
-    def with_view(self, cloud: Cloud, fixed: bool) -> Known:
+    def with_view(self, seen: Known) -> Known:
         """What is known with one more view of it."""
-        seen = Known.of(cloud.points_world_m, cloud.centroid_m, fixed)
         if seen.cells is None or self.cells is None:
-            return replace(seen, turning=self.turning, only=self.only)
+            return replace(seen, turning=self.turning)
         return self.joined(seen)
 
     def joined(self, other: Known) -> Known:

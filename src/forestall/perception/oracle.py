@@ -14,7 +14,6 @@ from forestall.domain.model import Domain
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Detection, Frame
 
-
 _NEAR_M = 0.1
 
 

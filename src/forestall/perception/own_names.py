@@ -6,7 +6,7 @@ tracks, and the hand knows a name, nothing here changes anything.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +14,8 @@ from scipy.optimize import linear_sum_assignment
 
 from forestall.domain.model import Domain
 from forestall.perception.forgetting import Tracks
-from forestall.perception.naming import Known, unused
-from forestall.perception.tracks import Track, middle
+from forestall.perception.naming import Known, of_one_piece, unused
+from forestall.perception.tracks import Track, View, middle, riding
 from forestall.perception.unproject import Points
 from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import Relation
@@ -24,7 +24,7 @@ from forestall.types.observation import GripperState, Observation, Vec3
 _POINTED_M = 0.15
 
 
-def felt(hand: GripperState, tracks: Tracks, former: str | None, domain: Domain) -> GripperState:
+def _named(hand: GripperState, tracks: Tracks, former: str | None, domain: Domain) -> GripperState:
     """A hand with a name for what it holds, where it only knows of which kind that is.
 
     What it held before, else the nearest thing of the kind, else a new one.
@@ -62,22 +62,32 @@ def _away(track: Track, place: Points) -> float:
     return float("inf") if lost else float(np.linalg.norm(track.centroid_m - place))
 
 
+def known(
+    category: str, points_m: Points, centroid_m: Points, domain: Domain, surfaces: bool = True
+) -> Known:
+    """Where a thing of a category is expected of which some points are known.
+
+    `surfaces`: furniture is told apart by its surface; not needed where a segmenter tracks.
+    """
+    if not surfaces:
+        return Known(centroid_m)
+    fixed, ground = (domain.is_a(category, r) for r in (domain.roles.fixture, domain.roles.ground))
+    return replace(Known.of(points_m, centroid_m, fixed), only=ground)
+
+
 def expected(
-    tracks: Tracks,
-    hands: Iterable[GripperState],
-    riding: Callable[[str], Collection[str]],
-    of: Callable[[str, Points, Points], Known],
+    tracks: Tracks, observation: Observation, domain: Domain, surfaces: bool = True
 ) -> dict[str, Known]:
     """Where everything located is expected now.
 
     What a hand holds or has let go, and what is in or on it, is where the hand says.
     """
-    known = {
-        name: of(t.category, t.points_world_m, t.centroid_m)
+    found = {
+        name: known(t.category, t.points_world_m, t.centroid_m, domain, surfaces)
         for name, t in tracks.items()
         if t.points_world_m is not None
     }
-    for hand in hands:
+    for hand in observation.hands:
         for name, place, turning in (
             (hand.released, hand.released_world_m, False),
             (hand.holding, hand.position_world_m, True),
@@ -86,26 +96,64 @@ def expected(
                 continue
             at, track = np.asarray(place, dtype=np.float64), tracks[name]
             offset = at - middle(track)
-            for rider in riding(name):
-                if rider in known:
-                    known[rider] = Known(known[rider].centroid_m + offset, turning=turning)
-            known[name] = Known(at, turning=turning)
-    return known
+            for rider in riding(tracks, name):
+                if rider in found:
+                    found[rider] = Known(found[rider].centroid_m + offset, turning=turning)
+            found[name] = Known(at, turning=turning)
+    return found
 
 
-def found_again(
-    tracks: Tracks, fresh: Collection[str], fixed: Callable[[str], bool]
+def join_parts(
+    view: View, places: dict[str, Known], tracks: Tracks, apart: Sequence[Collection[str]]
 ) -> dict[str, str]:
-    """New names → those of lost things of their kind that they must be, which they now bear.
+    """Names that turn out to be those of a part → the name of the piece of furniture.
+
+    Of two names the one that was known before stays.
+
+    Args:
+        view: shows both.
+        places: where everything is expected; changed.
+        tracks: what was known before.
+        apart: names of each view of this moment: what one view shows twice is two things.
+    """
+    parts: dict[str, str] = {}
+    for one, other in of_one_piece(view.ids, view.clouds, places).items():
+        if other not in view.guessed or any(one in ids and other in ids for ids in apart):
+            continue
+        later = one in tracks and other not in tracks
+        part, whole = (other, one) if later else (one, other)
+        if part in places and whole in places:
+            parts[part] = whole
+            places[whole] = places[whole].joined(places.pop(part))
+    return parts
+
+
+def settled(
+    tracks: Tracks,
+    relations: Sequence[Relation],
+    fresh: Collection[str],
+    told: Sequence[tuple[str, Vec3]],
+    domain: Domain,
+) -> list[Relation]:
+    """Relations once new names have given way to those of lost things, and to what was pointed at.
 
     Args:
         tracks: by name; changed.
+        relations: in the names that they had.
         fresh: named by perception in this observation for the first time.
-        fixed: whether a category does not move.
+        told: names that somebody gave to what is at a point.
+        domain: tells what does not move.
     """
+    names = _found_again(tracks, fresh, domain)
+    relations = _renamed(relations, names)
+    return _renamed(relations, _pointed_at(tracks, told, domain))
+
+
+def _found_again(tracks: Tracks, fresh: Collection[str], domain: Domain) -> dict[str, str]:
+    """New names → those of lost things of their kind that they must be, which they now bear."""
     names: dict[str, str] = {}
     kinds = {tracks[n].category for n in fresh if n in tracks}
-    for category in sorted(k for k in kinds if not fixed(k)):
+    for category in sorted(k for k in kinds if not domain.is_a(k, domain.roles.fixture)):
         new = sorted(n for n in fresh if n in tracks and tracks[n].category == category)
         lost = [
             t
@@ -125,7 +173,7 @@ def found_again(
     return names
 
 
-def pointed_at(tracks: Tracks, told: Sequence[tuple[str, Vec3]], domain: Domain) -> dict[str, str]:
+def _pointed_at(tracks: Tracks, told: Sequence[tuple[str, Vec3]], domain: Domain) -> dict[str, str]:
     """Names → those that somebody gave to the same things, which they now bear."""
     names: dict[str, str] = {}
     for name, point in told:
@@ -158,7 +206,7 @@ def _rename(tracks: Tracks, names: dict[str, str]) -> None:
             track.parent = (track.parent[0], names[track.parent[1]])
 
 
-def renamed(relations: Sequence[Relation], names: dict[str, str]) -> list[Relation]:
+def _renamed(relations: Sequence[Relation], names: dict[str, str]) -> list[Relation]:
     """Relations in the new names."""
     return [
         Relation(names.get(r.subject, r.subject), r.predicate, names.get(r.object, r.object))
@@ -170,5 +218,5 @@ def named_hands(
     observation: Observation, tracks: Tracks, former: str | None, domain: Domain
 ) -> Observation:
     """An observation in which every hand has a name for what it holds."""
-    hands = [felt(h, tracks, former, domain) for h in (observation.gripper, *observation.others)]
+    hands = [_named(h, tracks, former, domain) for h in (observation.gripper, *observation.others)]
     return replace(observation, gripper=hands[0], others=tuple(hands[1:]))

@@ -13,11 +13,13 @@ from dataclasses import replace
 from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.forgetting import remove
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
 from forestall.perception.gate_config import GateConfig, WatchConfig
 from forestall.perception.gate_time import SenseWatch
-from forestall.perception.naming import Known, name_detections, of_one_piece
+from forestall.perception.naming import Known, name_detections
+from forestall.perception.own_names import expected, join_parts, known, named_hands
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
 from forestall.perception.unproject import (
@@ -97,7 +99,8 @@ class GraphPerceiver:
                 "the observation has no picture, only a scene graph: use the perceiver given-graph"
             )
         masked = self._masks(observation)
-        observation = self._memory.named(observation)
+        tracks, held = self._memory.tracks, self._memory.held
+        observation = named_hands(observation, tracks, held, self._domain)
         views = self._views(observation, masked)
         self._memory.integrate(observation, views)
         if self._memory.forgotten:
@@ -136,26 +139,25 @@ class GraphPerceiver:
 
     def _views(self, observation: Observation, masked: Sequence[Masks]) -> list[View]:
         """Every frame with names for what it shows; what one frame tells the next ones know."""
-        known = self._memory.expected(observation)
+        tracked = all(d.instance is not None for m in masked for d in m.detections)
+        tracks, domain = self._memory.tracks, self._domain
+        places = expected(tracks, observation, domain, not tracked)
         parts: dict[str, str] = {}
-        views = []
+        views: list[View] = []
         for frame, masks in zip(observation.frames, masked, strict=True):
-            view = self._view(frame, masks, known, observation.robot_position_world_m)
+            view = self._view(frame, masks, places, observation.robot_position_world_m)
             for name, category, cloud in zip(view.ids, view.categories, view.clouds, strict=True):
                 if cloud is not None:
-                    fixed = self._is_fixture(category)
-                    seen = self._memory.known(category, cloud.points_world_m, cloud.centroid_m)
-                    known[name] = known[name].with_view(cloud, fixed) if name in known else seen
+                    points = cloud.points_world_m
+                    seen = known(category, points, cloud.centroid_m, domain, not tracked)
+                    places[name] = places[name].with_view(seen) if name in places else seen
             views.append(view)
-            if not view.guessed:
-                continue
-            for part, whole in of_one_piece(view.ids, view.clouds, known).items():
-                if not any({part, whole} <= set(v.ids) for v in views):
-                    if part in self._memory.tracks and whole not in self._memory.tracks:
-                        part, whole = whole, part
-                    parts[part] = whole
-                    known[whole] = known[whole].joined(known.pop(part))
-        self._memory.join(parts)
+            if not tracked:
+                apart = [set(v.ids) for v in views]
+                parts |= join_parts(view, places, tracks, apart)
+        for part, whole in parts.items():
+            if part in tracks:
+                remove(tracks, part, whole)
         return [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
 
     def _is_fixture(self, category: str) -> bool:

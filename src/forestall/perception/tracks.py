@@ -78,6 +78,18 @@ class View:
     guessed: frozenset[str] = frozenset()
 
 
+def riding(tracks: Mapping[str, Track], name: str | None) -> set[str]:
+    """What is in or on a thing, at any depth."""
+    found: set[str] = set()
+    pending = [] if name is None else [name]
+    while pending:
+        top = pending.pop()
+        on = {n for n, t in tracks.items() if t.parent is not None and t.parent[1] == top} - found
+        found |= on
+        pending += sorted(on)
+    return found
+
+
 _MOST_POINTS = 6000
 
 

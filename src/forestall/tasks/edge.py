@@ -22,7 +22,7 @@ from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Observation, Vec3
-from forestall.types.plan import Plan, Subtask
+from forestall.types.plan import Subtask
 
 NEAR_M = 0.15
 """How far from where it is believed to be a thing may be found."""
