@@ -42,7 +42,7 @@ class Known:
         centroid_m: (3,) in the world.
         cells: what is known of the surface of a piece of furniture, as sorted keys of a grid; None
             for other things.
-        size_m: (3,) of its box.
+        box_m: (2, 3) lower and upper corner of that surface.
         only: whether there is no other of its category: the ground.
         turning: whether it is in the hand, or on what is: it stands at another side of the robot
             in every view, as far from its axis and as high.
@@ -50,7 +50,7 @@ class Known:
 
     centroid_m: Points
     cells: Cells | None = None
-    size_m: Points | None = None
+    box_m: Points | None = None
     turning: bool = False
     only: bool = False
 
@@ -59,7 +59,7 @@ class Known:
         """Of all that is remembered of a thing."""
         if not fixed:
             return cls(centroid_m)
-        return cls(centroid_m, _cells(points_m), np.ptp(points_m, axis=0))
+        return cls(centroid_m, _cells(points_m), _box(points_m))
 
     def with_view(self, seen: Known) -> Known:
         """What is known with one more view of it."""
@@ -71,8 +71,16 @@ class Known:
         """A piece of furniture of which two parts are known."""
         assert self.cells is not None and other.cells is not None, "both are furniture"
         cells = np.union1d(self.cells, other.cells)
-        size_m = np.ptp(_places(cells), axis=0)
-        return replace(other, cells=cells, size_m=size_m, only=self.only)
+        assert self.box_m is not None and other.box_m is not None, "with a box"
+        box_m = _box(np.concatenate([self.box_m, other.box_m]))
+        return replace(other, cells=cells, box_m=box_m, only=self.only)
+
+    def touches(self, box_m: Points) -> bool:
+        """Whether a box comes near the surface's."""
+        if self.box_m is None:
+            return False
+        apart = np.maximum(self.box_m[0] - box_m[1], box_m[0] - self.box_m[1])
+        return bool(apart.max() <= 2 * _CELL_M)
 
 
 def name_detections(
@@ -146,6 +154,8 @@ def _cost(cloud: Cloud, known: Known, axis_m: Points, config: PerceptionConfig) 
     if known.only:
         return 0.0
     if known.cells is not None:
+        if not known.touches(np.stack([cloud.low_m, cloud.high_m])):
+            return _NEVER
         share = _shared(cloud.points_world_m, known.cells)
         if share >= config.same_surface_share:
             return 1.0 - share
@@ -166,8 +176,8 @@ def _is_side(cloud: Cloud, known: Known) -> bool:
     size = cloud.high_m - cloud.low_m
     across = int(np.argmin(size))
     flat = size[across] < _FLAT * np.median(size)
-    deep = known.size_m is not None and known.size_m[across] > 2 * max(size[across], _CELL_M)
-    return bool(flat and deep)
+    known_m = np.zeros(3) if known.box_m is None else np.ptp(known.box_m, axis=0)
+    return bool(flat and known_m[across] > 2 * max(size[across], _CELL_M))
 
 
 def of_one_piece(
@@ -188,7 +198,9 @@ def of_one_piece(
         for other, part in known.items():
             if other in names or other in found or category_of(other) != category_of(name):
                 continue
-            if part.cells is not None and _share_of(part.cells, whole.cells) >= _PART_SHARE:
+            if part.cells is None or part.box_m is None or not whole.touches(part.box_m):
+                continue
+            if _share_of(part.cells, whole.cells) >= _PART_SHARE:
                 found[other] = name
     return found
 
@@ -202,12 +214,8 @@ def _cells(points_m: Points) -> Cells:
     return np.unique(_keys(points_m))
 
 
-def _places(cells: Cells) -> Points:
-    """(n, 3) metres of the keys of a grid."""
-    mask = (1 << _BITS) - 1
-    parts = np.stack([cells >> 2 * _BITS, (cells >> _BITS) & mask, cells & mask], axis=1)
-    places: Points = parts * _CELL_M
-    return places
+def _box(points_m: Points) -> Points:
+    return np.stack([points_m.min(axis=0), points_m.max(axis=0)])
 
 
 def _keys(points_m: Points) -> Cells:

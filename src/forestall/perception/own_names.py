@@ -63,27 +63,28 @@ def _away(track: Track, place: Points) -> float:
 
 
 def known(
-    category: str, points_m: Points, centroid_m: Points, domain: Domain, surfaces: bool = True
+    category: str, points_m: Points, centroid_m: Points, domain: Domain, kinds: Collection[str]
 ) -> Known:
     """Where a thing of a category is expected of which some points are known.
 
-    `surfaces`: furniture is told apart by its surface; not needed where a segmenter tracks.
+    `kinds`: categories for whose things a name is looked for; others are not told apart.
     """
-    if not surfaces:
+    if category not in kinds:
         return Known(centroid_m)
     fixed, ground = (domain.is_a(category, r) for r in (domain.roles.fixture, domain.roles.ground))
     return replace(Known.of(points_m, centroid_m, fixed), only=ground)
 
 
 def expected(
-    tracks: Tracks, observation: Observation, domain: Domain, surfaces: bool = True
+    tracks: Tracks, observation: Observation, domain: Domain, kinds: Collection[str]
 ) -> dict[str, Known]:
     """Where everything located is expected now.
 
-    What a hand holds or has let go, and what is in or on it, is where the hand says.
+    What a hand holds or has let go, and what is in or on it, is where the hand says. `kinds` are
+    the categories for whose things a name is looked for.
     """
     found = {
-        name: known(t.category, t.points_world_m, t.centroid_m, domain, surfaces)
+        name: known(t.category, t.points_world_m, t.centroid_m, domain, kinds)
         for name, t in tracks.items()
         if t.points_world_m is not None
     }

@@ -139,9 +139,9 @@ class GraphPerceiver:
 
     def _views(self, observation: Observation, masked: Sequence[Masks]) -> list[View]:
         """Every frame with names for what it shows; what one frame tells the next ones know."""
-        tracked = all(d.instance is not None for m in masked for d in m.detections)
+        kinds = {d.category for m in masked for d in m.detections if d.instance is None}
         tracks, domain = self._memory.tracks, self._domain
-        places = expected(tracks, observation, domain, not tracked)
+        places = expected(tracks, observation, domain, kinds)
         parts: dict[str, str] = {}
         views: list[View] = []
         for frame, masks in zip(observation.frames, masked, strict=True):
@@ -149,10 +149,10 @@ class GraphPerceiver:
             for name, category, cloud in zip(view.ids, view.categories, view.clouds, strict=True):
                 if cloud is not None:
                     points = cloud.points_world_m
-                    seen = known(category, points, cloud.centroid_m, domain, not tracked)
+                    seen = known(category, points, cloud.centroid_m, domain, kinds)
                     places[name] = places[name].with_view(seen) if name in places else seen
             views.append(view)
-            if not tracked:
+            if kinds:
                 apart = [set(v.ids) for v in views]
                 parts |= join_parts(view, places, tracks, apart)
         for part, whole in parts.items():
