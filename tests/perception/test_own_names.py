@@ -164,6 +164,17 @@ def test_what_somebody_points_at_bears_the_name_that_is_said() -> None:
     assert on <= {n.id for n in graph.nodes}
 
 
+def test_a_neighbour_of_what_is_hidden_does_not_get_its_name() -> None:
+    pan = at("Pan-1", 0.22, 0.3, 0.91, (0.3, 0.3, 0.06), True)
+    told = (("StoveBurner-4", (0.22, 0.3, 0.905)),)
+    perceiver = _perceiver()
+    hidden = perceiver.perceive(replace(bare(observed([COUNTER, BURNERS[0], pan], EYE)), told=told))
+    assert "StoveBurner-4" not in _where(hidden, "StoveBurner")
+    shown = replace(bare(observed([COUNTER, *BURNERS], EYE, time_s=1.0)), told=told)
+    places = _where(perceiver.perceive(shown), "StoveBurner")
+    assert places["StoveBurner-4"][0] == pytest.approx(0.22, abs=0.02)
+
+
 def test_true_states_are_found_by_place_where_masks_have_no_names() -> None:
     mugs = [at("Mug-8", -0.3, 0.3, 0.9, MUG, True), at("Mug-3", 0.3, 0.3, 0.9, MUG, True)]
     truth = SceneGraph(tuple(ObjectNode(s.id, "Mug", box_m=Box(s.low, s.high)) for s in mugs))

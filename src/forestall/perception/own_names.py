@@ -21,7 +21,7 @@ from forestall.types.facts import category_of, is_instance
 from forestall.types.graph import Relation
 from forestall.types.observation import GripperState, Observation, Vec3
 
-_POINTED_M = 0.15
+_POINTED_M = 0.07  # a part that shows of a thing may lie so far from the middle that is pointed at
 
 
 def _named(hand: GripperState, tracks: Tracks, former: str | None, domain: Domain) -> GripperState:
