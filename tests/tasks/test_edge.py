@@ -22,6 +22,7 @@ from forestall.tasks.truth import TrueMoment, TruthTrace
 from forestall.testing.conformance import check_environment
 from forestall.testing.symbolic_world import SymbolicWorld
 from forestall.types.episode import SkillStatus
+from forestall.types.facts import category_of
 from forestall.types.observation import Frame, Intrinsics
 from forestall.types.plan import Plan, Subtask
 from forestall.types.scene import ObjectNeed, SceneNeeds
@@ -233,7 +234,7 @@ def test_no_name_of_the_simulator_reaches_a_strategy_and_the_task_is_done(task: 
     told = sorted({a for s in loaded.task.plan for a in s.args if "-" in a})
     edge = WorldsEdge(world, world.truth, loaded.domain, told)
     strategy, trace = Overhearing(), TruthTrace()
-    trace.attach(world, loaded.domain, edge.truly)
+    trace.attach(world, loaded.domain, edge)
     perceiver = GraphPassthrough(loaded.domain)
     record = Runtime(edge, perceiver, strategy, loaded.domain, [trace]).run(
         loaded.task, loaded.task.plan, 10_000
@@ -244,6 +245,9 @@ def test_no_name_of_the_simulator_reaches_a_strategy_and_the_task_is_done(task: 
     assert not [t for t in strategy.heard for s in sentinels.values() if s in t]
     assert not [t for t in map(repr, record.executed) for s in sentinels.values() if s in t]
     assert set(trace.moments) == {TrueMoment(True, True)}
+    true = {n.id for n in world.truth().nodes} | set(loaded.domain.categories)
+    made = {a for s in trace.executed for a in s.args if a not in true}
+    assert {category_of(a) for a in made} <= {"Lettuce", "Potato", "Tomato"}  # what was cut
 
 
 def test_the_truth_of_a_plan_for_a_thing_that_is_not_there_is_that_it_cannot_be_done() -> None:

@@ -148,8 +148,8 @@ def run_episode(
     with part.open(needs, loaded.domain, remember=world is not None) as opened:
         environment = make_environment(prepared, opened)
         if trace is not None:
-            meant = environment.truly if isinstance(environment, WorldsEdge) else None
-            trace.attach(opened.oracle, loaded.domain, meant)
+            meanings = environment if isinstance(environment, WorldsEdge) else None
+            trace.attach(opened.oracle, loaded.domain, meanings)
             listeners = (*listeners, trace)
         runtime = make_runtime(prepared, opened, environment, demonstrations, listeners)
         return runtime.run(

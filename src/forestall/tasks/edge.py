@@ -4,7 +4,7 @@ Wraps the environment of a run whose household shares no names (`OpenWorld.share
 pictures show kinds of things without an identity, and the hand says what it was told to take.
 Inwards a name that perception gave means the thing of its category where perception believes it to
 be. Faults and disturbances lie inside: they speak of true things. Built by `assembly`, which also
-hands `truly` to the trace of the truth; nothing of it comes back to the run.
+hands it to the trace of the truth; nothing of it comes back to the run.
 """
 
 from __future__ import annotations
@@ -87,6 +87,7 @@ class WorldsEdge:
         self._told: dict[str, Vec3] | None = None
         self._called: dict[str, str] = {}  # true thing → what the newest commands called it
         self._hand: str | None = None
+        self.newest: Subtask | None = None  # the newest command, in true names
         self._shown: dict[str, str] = {}  # true thing → its name in graphs that are given
 
     def reset(self, seed: int) -> None:
@@ -126,12 +127,14 @@ class WorldsEdge:
             skill = self._domain.skills.get(subtask.skill)
             drives = skill is not None and skill.drives
             seconds = self._drive_near(subtask.args[-1], where) if drives else 0.0
+            self.newest = self._truly(subtask, where, true)
             return SkillOutcome(SkillStatus.REFUSED, seconds, str(error))
         if self._hand is None:
             self._called = {}
         pairs = zip(args, subtask.args, strict=True)
         self._called |= {t: self._domain.canonical(n) for t, n in pairs if is_instance(t)}
-        outcome = self._inner.execute(Subtask(subtask.skill, args))
+        self.newest = Subtask(subtask.skill, args)
+        outcome = self._inner.execute(self.newest)
         return replace(outcome, reason=_NAME.sub(self._spoken, outcome.reason))
 
     def hold(self) -> None:
@@ -152,7 +155,9 @@ class WorldsEdge:
 
         A name that points at nothing of its category becomes that of an instance that is not there.
         """
-        true, where = self._true(), graph.places()
+        return self._truly(subtask, graph.places(), self._true())
+
+    def _truly(self, subtask: Subtask, where: Where, true: SceneGraph) -> Subtask:
         args = []
         for name in subtask.args:
             try:

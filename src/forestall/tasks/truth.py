@@ -107,9 +107,7 @@ class TruthTrace:
         self._meanings: Meanings | None = None
         self._succeeded = True
 
-    def attach(
-        self, oracle: OracleView, domain: Domain, meanings: Meanings | None = None
-    ) -> None:
+    def attach(self, oracle: OracleView, domain: Domain, meanings: Meanings | None = None) -> None:
         """Say whose truth is meant; `assembly` does.
 
         Args:
