@@ -1,9 +1,10 @@
 """What stands in the way of what: the approach corridor, and masks that cut each other.
 
-A hand comes over the open edge of a support, or through the open side of a container; what stands
-in its corridor blocks. Where one mask cuts off a good part of another's outline with a step in
-depth (REFLECT's "blocking": image overlap and smaller depth), the corridor is tested with slack,
-because part of the target is hidden. Called by `fuse.py`.
+A hand of some width, thickness and length (`config.py`) comes level for the middle of a thing, over
+the open edge of a support or through the open side of a container; what stands in its corridor
+blocks. Where one mask cuts off a good part of another's outline with a step in depth (REFLECT's
+"blocking": image overlap and smaller depth), the corridor is tested with slack, because part of the
+target is hidden. Called by `fuse.py`.
 """
 
 from __future__ import annotations

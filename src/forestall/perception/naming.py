@@ -8,7 +8,7 @@ Called by the perceiver.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,6 +89,7 @@ def name_detections(
     known: Mapping[str, Known],
     axis_m: Sequence[float],
     config: PerceptionConfig,
+    reserved: Collection[str] = (),
 ) -> list[str]:
     """An instance name for every detection.
 
@@ -98,6 +99,7 @@ def name_detections(
         known: instance → where it is expected.
         axis_m: where the robot stands.
         config: how far off a thing may be, and how much of what a view shows must be known.
+        reserved: names that nothing gets for its place.
     """
     names = [d.instance or "" for d in detections]
     taken = {n for n in names if n}
@@ -111,7 +113,7 @@ def name_detections(
         for i, name in _assigned(located, there, np.asarray(axis_m), config).items():
             names[i] = name
             taken.add(name)
-        used = {n for n in (*known, *taken) if category_of(n) == category}
+        used = {n for n in (*known, *taken, *reserved) if category_of(n) == category}
         for i in mine:
             if not names[i]:
                 names[i] = unused(category, used)

@@ -24,14 +24,16 @@ from forestall.types.observation import GripperState, Observation, Vec3
 _POINTED_M = 0.07  # a part that shows of a thing may lie so far from the middle that is pointed at
 
 
-def _named(hand: GripperState, tracks: Tracks, former: str | None, domain: Domain) -> GripperState:
+def _named(
+    hand: GripperState, tracks: Tracks, former: str | None, domain: Domain, used: set[str]
+) -> GripperState:
     """A hand with a name for what it holds, where it only knows of which kind that is.
 
-    What it held before, else the nearest thing of the kind, else a new one.
+    What it held before, else the nearest thing of the kind, else a new one with no name in `used`.
     """
     return replace(
         hand,
-        holding=_felt(hand.holding, hand, tracks, former, domain),
+        holding=_felt(hand, tracks, former, domain, used),
         released=former if _is_kind(hand.released, former, domain) else hand.released,
     )
 
@@ -44,8 +46,9 @@ def _is_kind(name: str | None, thing: str | None, domain: Domain) -> bool:
 
 
 def _felt(
-    name: str | None, hand: GripperState, tracks: Tracks, former: str | None, domain: Domain
+    hand: GripperState, tracks: Tracks, former: str | None, domain: Domain, used: set[str]
 ) -> str | None:
+    name = hand.holding
     if name is None or is_instance(name) or name in tracks or domain.find(name) is None:
         return name
     if _is_kind(name, former, domain):
@@ -54,7 +57,7 @@ def _felt(
     place = np.asarray(hand.position_world_m)
     alike = [t for t in tracks.values() if t.category == category]
     near = min(alike, key=lambda t: (_away(t, place), t.id), default=None)
-    return unused(category, set(tracks)) if near is None else near.id
+    return unused(category, used) if near is None else near.id
 
 
 def _away(track: Track, place: Points) -> float:
@@ -219,5 +222,7 @@ def named_hands(
     observation: Observation, tracks: Tracks, former: str | None, domain: Domain
 ) -> Observation:
     """An observation in which every hand has a name for what it holds."""
-    hands = [_named(h, tracks, former, domain) for h in (observation.gripper, *observation.others)]
+    used = {*tracks, *(n for n, _ in observation.told)}
+    both = (observation.gripper, *observation.others)
+    hands = [_named(h, tracks, former, domain, used) for h in both]
     return replace(observation, gripper=hands[0], others=tuple(hands[1:]))

@@ -142,10 +142,11 @@ class GraphPerceiver:
         kinds = {d.category for m in masked for d in m.detections if d.instance is None}
         tracks, domain = self._memory.tracks, self._domain
         places = expected(tracks, observation, domain, kinds)
+        axis_m, told = observation.robot_position_world_m, [n for n, _ in observation.told]
         parts: dict[str, str] = {}
         views: list[View] = []
         for frame, masks in zip(observation.frames, masked, strict=True):
-            view = self._view(frame, masks, places, observation.robot_position_world_m)
+            view = self._view(frame, masks, places, axis_m, told)
             for name, category, cloud in zip(view.ids, view.categories, view.clouds, strict=True):
                 if cloud is not None:
                     points = cloud.points_world_m
@@ -163,7 +164,14 @@ class GraphPerceiver:
     def _is_fixture(self, category: str) -> bool:
         return self._domain.is_a(category, self._domain.roles.fixture)
 
-    def _view(self, frame: Frame, masks: Masks, known: Mapping[str, Known], axis_m: Vec3) -> View:
+    def _view(
+        self,
+        frame: Frame,
+        masks: Masks,
+        known: Mapping[str, Known],
+        axis_m: Vec3,
+        told: Collection[str],
+    ) -> View:
         detections, labels = masks.detections, masks.labels
         states = self._estimator.estimate(frame, detections)
         if len(states) != len(detections):
@@ -180,7 +188,7 @@ class GraphPerceiver:
                 None if d.score < least else cloud
                 for d, cloud in zip(detections, found, strict=True)
             ]
-        names = name_detections(detections, found, known, axis_m, self._config)
+        names = name_detections(detections, found, known, axis_m, self._config, told)
         return View(
             frame=frame,
             labels=labels,
