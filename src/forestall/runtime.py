@@ -276,14 +276,14 @@ class Runtime:
         with self._monitor.phase("act"):
             place = self._monitor.approach()
             if place is not None:
-                self._world.approach(place)
+                self._world.approach(place, self._monitor.graph.places())
         return self._judged(episode, self._monitor.before)
 
     def _execute(self, episode: _Episode, decision: MonitorDecision) -> MonitorDecision | None:
         monitor, command = self._monitor, decision.command
         assert command is not None, "what may start has a command"
         with monitor.phase("act"):
-            outcome = self._world.execute(command)
+            outcome = self._world.execute(command, monitor.graph.places())
         answer = monitor.after(outcome)
         try:
             episode.time_s = self._world.time_s()

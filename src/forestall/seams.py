@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +73,23 @@ class Environment(Protocol):
         """Free what the environment holds."""
 
 
+@runtime_checkable
+class Unnamed(Protocol):
+    """An environment that shares no names of things with perception, beside `Environment`.
+
+    Its commands bear the names that perception gave, and say where it believes each thing to be:
+    name → a point in the world, None for a thing whose place it has lost. What the points show is
+    meant, and where nothing of the name's category is near, the command is refused. A category
+    alone means what the robot takes for it, as in any environment.
+    """
+
+    def approach_at(self, name: str, where: Mapping[str, Vec3 | None]) -> float:
+        """As `approach`; where the thing is not there, to where it was believed to be."""
+
+    def execute_at(self, subtask: Subtask, where: Mapping[str, Vec3 | None]) -> SkillOutcome:
+        """As `execute`."""
+
+
 class OracleView(Protocol):
     """Ground truth. Only worlds, perception/oracle and tasks/ may touch it."""
 
@@ -109,7 +126,11 @@ class Disturbance(Protocol):
 
 
 class OpenWorld(Protocol):
-    """One world made for one run, seen from its three sides."""
+    """One world made for one run, seen from its three sides.
+
+    One that also has `shares_names`, False, keeps its names to itself: `tasks/edge.py` lies around
+    what the robot gets.
+    """
 
     @property
     def environment(self) -> Environment:

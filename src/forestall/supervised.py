@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from forestall.errors import ForestallError, ObservationError, PartError
+from forestall.seams import Unnamed
 from forestall.supervision import Supervisor, checked_answer
 from forestall.types.episode import SkillOutcome
 from forestall.types.graph import SceneGraph
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from forestall.domain.model import Domain
     from forestall.seams import Environment, Perceiver, Strategy
 
+Where = Mapping[str, Vec3 | None]
 Scope = Callable[[SceneGraph, Subtask], SceneGraph]
 
 
@@ -51,14 +53,27 @@ class SupervisedWorld:
         """Look towards points."""
         return self._seen("observe", lambda: self._environment.observe(focus))
 
-    def approach(self, name: str) -> None:
-        """Drive to a thing."""
-        self._calls.call("approach", lambda: self._environment.approach(name), "approach")
+    def approach(self, name: str, where: Where) -> None:
+        """Drive to a thing; `where` things are is told to a world that shares no names."""
+        world = self._environment
 
-    def execute(self, subtask: Subtask) -> SkillOutcome:
+        def drive() -> float:
+            if isinstance(world, Unnamed):
+                return world.approach_at(name, where)
+            return world.approach(name)
+
+        self._calls.call("approach", drive, "approach")
+
+    def execute(self, subtask: Subtask, where: Where) -> SkillOutcome:
         """Run one skill."""
-        do = self._environment.execute
-        return self._calls.call("execute", lambda: do(subtask), "execute", gives=SkillOutcome)
+        world = self._environment
+
+        def do() -> SkillOutcome:
+            if isinstance(world, Unnamed):
+                return world.execute_at(subtask, where)
+            return world.execute(subtask)
+
+        return self._calls.call("execute", do, "execute", gives=SkillOutcome)
 
     def time_s(self) -> float:
         """The world's clock, which does not go back; what it said last where nobody can ask it."""

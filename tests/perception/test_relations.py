@@ -172,6 +172,24 @@ def test_pot_beside_a_knife_does_not_block_it(x: float) -> None:
     assert blocked(graph_of([COUNTER, knife, beside])) == set()
 
 
+@pytest.mark.parametrize(
+    ("front", "size", "blocks"),
+    [
+        ((0.0, 0.15), (0.05, 0.05, 0.05), True),
+        ((0.0, 0.15), (0.05, 0.05, 0.02), False),  # the hand passes over it
+        ((0.09, 0.15), (0.05, 0.05, 0.05), False),  # beside the hand's way
+        ((0.06, 0.15), (0.05, 0.05, 0.05), True),  # in the way of its edge
+        ((0.0, 0.05), (0.05, 0.05, 0.05), False),  # before the wrist
+    ],
+)
+def test_a_hand_has_a_width_a_length_and_a_height(
+    front: tuple[float, float], size: tuple[float, float, float], blocks: bool
+) -> None:
+    mug = at("Mug-1", 0.0, 0.5, 0.9, MUG, True)
+    other = at("Knife-1", *front, 0.9, size)
+    assert (("Knife-1", "Mug-1") in blocked(graph_of([COUNTER, mug, other]))) == blocks
+
+
 def test_nothing_blocks_what_stands_before_it() -> None:
     knife = at("Knife-1", 0.0, 0.45, 0.9, (0.3, 0.035, 0.02))
     before = at("Pot-1", 0.0, 0.25, 0.9, (0.2, 0.2, 0.13), True)

@@ -24,7 +24,8 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import LIMIT, PERCEIVER, STATES, STRATEGY, WORLD
 from forestall.runtime import Runtime, RuntimeConfig
-from forestall.seams import Listener, OpenWorld, OracleView, Strategy, WorldPart
+from forestall.seams import Environment, Listener, OpenWorld, OracleView, Strategy, WorldPart
+from forestall.tasks.edge import WorldsEdge, named
 from forestall.tasks.faults import (
     Fault,
     apply_plan_faults,
@@ -145,10 +146,12 @@ def run_episode(
     needs = apply_scene_faults(loaded.task.scene, prepared.faults, loaded.domain)
     part = world or make_world(prepared.config, loaded.domain)
     with part.open(needs, loaded.domain, remember=world is not None) as opened:
+        environment = make_environment(prepared, opened)
         if trace is not None:
-            trace.attach(opened.oracle, loaded.domain)
+            meanings = environment if isinstance(environment, WorldsEdge) else None
+            trace.attach(opened.oracle, loaded.domain, meanings)
             listeners = (*listeners, trace)
-        runtime = make_runtime(prepared, opened, demonstrations, listeners)
+        runtime = make_runtime(prepared, opened, environment, demonstrations, listeners)
         return runtime.run(
             loaded.task,
             prepared.plan,
@@ -172,9 +175,19 @@ def run_episode(
         )
 
 
+def make_environment(prepared: Prepared, world: OpenWorld) -> Environment:
+    """What the robot gets of an open world: its faults, and an edge where names stay inside."""
+    domain = prepared.loaded.domain
+    faulty = wrap(world.environment, prepared.faults, world.disturbance, domain)
+    if getattr(world, "shares_names", True):
+        return faulty
+    return WorldsEdge(faulty, world.oracle.truth, domain, named(prepared.plan))
+
+
 def make_runtime(
     prepared: Prepared,
     world: OpenWorld,
+    environment: Environment,
     demonstrations: Sequence[Demonstration] | None,
     listeners: Sequence[Listener],
 ) -> Runtime:
@@ -183,7 +196,7 @@ def make_runtime(
     known = prepared.model or domain
     parts = Assembly(config.choices, known, demonstrations, {"truth": world.oracle})
     return Runtime(
-        wrap(world.environment, prepared.faults, world.disturbance, domain),
+        environment,
         parts.part(PERCEIVER),
         parts.part(STRATEGY),
         known,

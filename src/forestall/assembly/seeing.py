@@ -19,7 +19,7 @@ from forestall.perception.learned import LearnedStateEstimator
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
-from forestall.seams import ImageTextEncoder, Parts
+from forestall.seams import ImageTextEncoder, OracleView, Parts
 
 _PERCEPTION, _SCORE = PerceptionConfig(), ScoreConfig()
 
@@ -63,7 +63,8 @@ def bench() -> Domain:
 
 def oracle(parts: Parts) -> OracleStateEstimator:
     """The truth of what a camera could tell."""
-    return OracleStateEstimator(parts.lent("truth").states, parts.domain)
+    oracle: OracleView = parts.lent("truth")
+    return OracleStateEstimator(oracle.states, parts.domain, oracle.truth)
 
 
 def given(parts: Parts) -> GivenStateEstimator:

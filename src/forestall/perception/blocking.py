@@ -1,9 +1,10 @@
 """What stands in the way of what: the approach corridor, and masks that cut each other.
 
-A hand comes over the open edge of a support, or through the open side of a container; what stands
-in its corridor blocks. Where one mask cuts off a good part of another's outline with a step in
-depth (REFLECT's "blocking": image overlap and smaller depth), the corridor is tested with slack,
-because part of the target is hidden. Called by `fuse.py`.
+A hand of some width, thickness and length (`config.py`) comes level for the middle of a thing, over
+the open edge of a support or through the open side of a container; what stands in its corridor
+blocks. Where one mask cuts off a good part of another's outline with a step in depth (REFLECT's
+"blocking": image overlap and smaller depth), the corridor is tested with slack, because part of the
+target is hidden. Called by `fuse.py`.
 """
 
 from __future__ import annotations
@@ -168,15 +169,19 @@ def _from_above(stack: Stack, support: int, target: int, config: PerceptionConfi
 def _in_the_way(
     target: tuple[float, ...], other: tuple[float, ...], cut: bool, config: PerceptionConfig
 ) -> bool:
-    """Whether `other` stands in the target's corridor towards the hand.
+    """Whether `other` stands in the hand's way to the middle of the target.
 
-    Of a target that the other one cuts off in the image, some is hidden behind it.
+    Of a target that the other one cuts off in the image, some is hidden behind it, and its middle
+    is not known so well.
     """
     _, front, left, right, foot, top = target
     back_b, front_b, left_b, right_b, foot_b, top_b = other
-    if top_b < foot + config.min_obstacle_m or foot_b >= top:
+    under = foot + max((top - foot - config.hand_thick_m) / 2, config.hand_over_m)
+    if top_b < under or foot_b >= top:
         return False
-    if front_b <= front or back_b >= front + config.corridor_m:
+    if front_b <= front or back_b >= front + config.hand_long_m:
         return False
-    margin = -config.cut_slack_m if cut else config.corridor_margin * (right - left)
-    return right_b > left + margin and left_b < right - margin
+    middle, half = (left + right) / 2, config.hand_wide_m / 2
+    if cut:
+        half = max(half, (right - left) / 2 + config.cut_slack_m)
+    return right_b > middle - half and left_b < middle + half

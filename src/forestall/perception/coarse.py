@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.perception.unproject import Labels, Points, label_image
-from forestall.types.facts import category_of
+from forestall.types.facts import category_of, is_instance
 from forestall.types.observation import Detection, Frame
 
 Flags = npt.NDArray[np.bool_]
@@ -64,7 +64,8 @@ class Coarse:
         if masks is None and frame.detections is None and frame.instance_ids is not None:
             labels = frame.instance_ids[::step, ::step].astype(np.int16)
             names = frame.instance_names
-            return cls(frame, step, labels, tuple(category_of(n) for n in names), names)
+            instances = tuple(n if is_instance(n) else None for n in names)
+            return cls(frame, step, labels, tuple(category_of(n) for n in names), instances)
         if masks is None:
             masks = Masks.of(frame.detections or (), step, frame.depth_m.shape)
             labels = masks.labels

@@ -51,13 +51,15 @@ class PerceptionConfig:
         vertical_cosine: direction cosine for above and below (REFLECT: 0.9).
         lateral_cosine: for left and right (REFLECT: 0.8).
         frontal_cosine: for in front of and behind (REFLECT: 0.9).
-        corridor_m: how far in front of a thing another one stands in the way.
-        corridor_margin: share of a thing's width at each side that may be covered: a hand grasps
-            its middle.
+        hand_wide_m: how wide a hand is (as two-finger grippers are), which comes level for the
+            middle of a thing: what stands in a way so wide blocks.
+        hand_long_m: how far behind its fingertips a hand with its wrist is as low as they are.
+        hand_thick_m: how thick it is; it grasps at half a thing's height, and what stays under it
+            blocks nothing.
+        hand_over_m: how far over what it works on it stays at least.
         oblong: how much longer the long side of a support must be to tell its front.
         floor_m: things whose foot is lower are reached from above.
         headroom_m: things in containers that do not rise higher above them likewise.
-        min_obstacle_m: how far an obstacle must rise above the target's foot.
         occlusion_share: share of a mask's outline that the nearer mask cuts off (REFLECT asks for
             an image overlap of 0.5 of whole boxes; an outline is evidence of real occlusion).
         cut_slack_m: how far beside a thing that it cuts off another one may stand and block it.
@@ -80,6 +82,8 @@ class PerceptionConfig:
         max_lost: things of one category whose place is lost that are remembered; the last ones.
         max_things: things remembered in all; what has not been observed for longest goes first.
         same_place_m: distance over which an untracked detection is the same object as before.
+        same_surface_share: share of what an untracked view shows of a piece of furniture that must
+            lie on what is known of it, or the other way round, to be the same piece.
     """
 
     min_pixels: int = 20
@@ -110,12 +114,13 @@ class PerceptionConfig:
     vertical_cosine: float = 0.9
     lateral_cosine: float = 0.8
     frontal_cosine: float = 0.9
-    corridor_m: float = 0.25
-    corridor_margin: float = 0.2
+    hand_wide_m: float = 0.09
+    hand_long_m: float = 0.30
+    hand_thick_m: float = 0.05
+    hand_over_m: float = 0.03
     oblong: float = 1.15
     floor_m: float = 0.3
     headroom_m: float = 0.1
-    min_obstacle_m: float = 0.04
     occlusion_share: float = 0.12
     cut_slack_m: float = 0.02
     depth_edge_m: float = 0.03
@@ -127,6 +132,7 @@ class PerceptionConfig:
     interior_share: float = 0.1
     glimpse_share: float = 0.5
     same_place_m: float = 0.3
+    same_surface_share: float = 0.25
     same_share: float = 0.3
     max_lost: int = 5
     max_things: int = 400

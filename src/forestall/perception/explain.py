@@ -17,7 +17,7 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from forestall.perception.coarse import Masks
-from forestall.types.facts import category_of
+from forestall.types.facts import category_of, is_instance
 from forestall.types.finding import Finding
 from forestall.types.graph import ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import Detection, Frame, Observation
@@ -78,7 +78,7 @@ def _detections(frame: Frame) -> Sequence[Detection]:
     if frame.detections is not None or frame.instance_ids is None:
         return frame.detections or ()
     return [
-        Detection(category_of(frame.instance_names[i]), frame.instance_ids == i, n)
+        Detection(category_of(n), frame.instance_ids == i, n if is_instance(n) else None)
         for i in np.unique(frame.instance_ids[frame.instance_ids >= 0])
         for n in (frame.instance_names[i],)
     ]

@@ -38,7 +38,7 @@ from forestall.perception.gate_config import GateConfig
 from forestall.reading.documents import read_json
 from forestall.reading.files import inside
 from forestall.reading.models import validated
-from forestall.types.facts import category_of
+from forestall.types.facts import category_of, is_instance
 from forestall.types.finding import refuse
 from forestall.types.observation import (
     Detection,
@@ -377,7 +377,10 @@ def _write_frame(
         Image.fromarray((frame.instance_ids + 1).astype(np.uint16)).save(folder / masks)
         for i in np.unique(frame.instance_ids[frame.instance_ids >= 0]):
             name = frame.instance_names[int(i)]
-            detections.append({"category": category_of(name), "instance": name, "id": int(i) + 1})
+            instance = name if is_instance(name) else None
+            detections.append(
+                {"category": category_of(name), "instance": instance, "id": int(i) + 1}
+            )
     for detection in detections:
         known = states.get(str(detection["instance"]))
         if known:

@@ -17,6 +17,7 @@ from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.forgetting import let_go, merge_renamed, remove
 from forestall.perception.geometry import Stack, Thing
+from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
 from forestall.perception.support import Parent, parents
@@ -30,6 +31,7 @@ from forestall.perception.tracks import (
     gap_m,
     interior_observed,
     middle,
+    riding,
     thinned,
     vec,
 )
@@ -53,7 +55,7 @@ class SceneMemory:
     def reset(self) -> None:
         """Forget everything."""
         self.tracks: dict[str, Track] = {}
-        self._held: str | None = None
+        self.held: str | None = None
         self._hands: tuple[GripperState, ...] = ()
         self._relations: list[Relation] = []
         self.forgotten: tuple[str, ...] = ()  # in the newest observation, for want of room
@@ -65,8 +67,8 @@ class SceneMemory:
         before = [self.tracks[i] for i in sorted(self.tracks)]
         fate = fates(before, views, self._config)
         self._hands = observation.hands
-        former = self._held
-        self._held = observation.gripper.holding if observation.gripper.told else None
+        former = self.held
+        self.held = observation.gripper.holding if observation.gripper.told else None
         places = {t.id: middle(t) for t in before if t.points_world_m is not None}
         seen = self._take_in(views, fate, observation.time_s)
         for hand in self._hands:
@@ -74,7 +76,7 @@ class SceneMemory:
                 self._hold(hand.holding, hand.position_world_m, seen)
         put = self._put_down(observation.gripper, seen)
         moved = put | self._carry(places, seen | put)
-        if former is not None and former != self._held and former not in seen | put:
+        if former is not None and former != self.held and former not in seen | put:
             self._drop_from_memory(former, seen)
         kept = seen | moved | {h.holding for h in self._hands if h.holding is not None}
         kept |= set(unlocated(views))
@@ -86,14 +88,18 @@ class SceneMemory:
         self.forgotten = let_go(self.tracks, kept, self._config)
         self._relate(seen, views)
         self._mark(seen, fate, views)
+        guessed = {n for v in views for n in v.guessed if n in seen - was}
+        self._relations = settled(
+            self.tracks, self._relations, guessed, observation.told, self._domain
+        )
 
     def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""
         found = gather(views)
         fixtures = {n for n, f in found.items() if self._is_fixture(f[-1].category)}
         movable = {n: f for n, f in found.items() if n not in fixtures}
-        riding = self._riding(self._held)
-        shown = placing(movable, self._held, riding, self._config.ring_m)
+        along = riding(self.tracks, self.held)
+        shown = placing(movable, self.held, along, self._config.ring_m)
         shown |= {n: found[n] for n in fixtures}
         for name in sorted(shown):
             track = self.tracks.get(name)
@@ -105,7 +111,7 @@ class SceneMemory:
             track.pixels = found[name][-1].cloud.pixels
             track.last_seen_s = time_s
             read = readings(found[name], self._config.glimpse_share)
-            if name == self._held:
+            if name == self.held:
                 read = in_hand(read, track.states, self._changing)
             track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
@@ -125,16 +131,6 @@ class SceneMemory:
             track.pixels = int(np.count_nonzero(view.labels == label))
             track.last_seen_s = time_s
             track.states.update((a, v) for a, v in view.states[label].items() if v is not None)
-
-    def _riding(self, name: str | None) -> set[str]:
-        """What is in or on a thing, at any depth."""
-        found: set[str] = set()
-        pending = [] if name is None else [name]
-        while pending:
-            fresh = {t.id for t in self._children(pending.pop())} - found
-            found |= fresh
-            pending += sorted(fresh)
-        return found
 
     def _place(self, track: Track, fresh: Points, fate: Fates | None) -> None:
         """Set a track's cloud from the newest views and what they leave standing of the old."""
@@ -156,7 +152,7 @@ class SceneMemory:
         agree = int(np.count_nonzero(fate == Fate.CONFIRMED))
         differ = int(np.count_nonzero(fate == Fate.GONE))
         still = agree >= self._config.unmoved_share * (agree + differ)
-        return agree > 0 and still and track.id != self._held
+        return agree > 0 and still and track.id != self.held
 
     def _hold(self, held: str, hand_m: Vec3, seen: set[str]) -> None:
         track = self.tracks.get(held)
@@ -191,12 +187,12 @@ class SceneMemory:
             for name, t in sorted(self.tracks.items())
             if name in places
             and t.points_world_m is not None
-            and (name in seen or name == self._held)
+            and (name in seen or name == self.held)
             and not self._is_fixture(t.category)
         ]
         while pending:
             name, offset = pending.pop()
-            if float(np.linalg.norm(offset)) < _STILL_M and name != self._held:
+            if float(np.linalg.norm(offset)) < _STILL_M and name != self.held:
                 continue
             for child in self._children(name):
                 if child.id not in seen and child.id not in moved:
@@ -245,7 +241,7 @@ class SceneMemory:
         fresh = [self.tracks[i] for i in sorted(seen) if self.tracks[i].first_seen_s == time_s]
         for name in sorted(self.tracks):
             track = self.tracks[name]
-            if name in seen or name == self._held:
+            if name in seen or name == self.held:
                 continue
             becomes = self._domain.becomes(track.category)
             pieces = [t for t in fresh if t.category in becomes]

@@ -1,36 +1,105 @@
 """Names for detections whose segmenter does not track instances.
 
-A detection takes the name of the nearest object of its category that is close to where it was
-(assignment by least total distance), or a new number. Called by the perceiver.
+A detection takes the name of what is known where it is (assignment by least total distance), or a
+new number. Small things are where their middle is; of furniture a view shows a part, and the part
+lies on what is known of it. What is in the hand goes round with the robot between two views.
+Called by the perceiver.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from forestall.perception.config import PerceptionConfig
 from forestall.perception.unproject import Cloud, Points
 from forestall.types.facts import category_of
 from forestall.types.observation import Detection
 
+Cells = npt.NDArray[np.int64]
+
 _NEVER = 1e6
+_CELL_M = 0.03
+_SAMPLES = 300
+_EDGE_SHARE = 0.02  # what two sides of one piece share: the edge between them
+_FLAT = 0.2  # thickness of a side, as a share of its middle extent
+_PART_SHARE = 0.5  # of a part that lies on a piece
+_BITS = 16
+_AROUND = np.array([(x << 2 * _BITS) + (y << _BITS) + z for x, y, z in np.ndindex(3, 3, 3)]) - (
+    (1 << 2 * _BITS) + (1 << _BITS) + 1
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """Where a thing is expected.
+
+    Args:
+        centroid_m: (3,) in the world.
+        cells: what is known of the surface of a piece of furniture, as sorted keys of a grid; None
+            for other things.
+        box_m: (2, 3) lower and upper corner of that surface.
+        only: whether there is no other of its category: the ground.
+        turning: whether it is in the hand, or on what is: it stands at another side of the robot
+            in every view, as far from its axis and as high.
+    """
+
+    centroid_m: Points
+    cells: Cells | None = None
+    box_m: Points | None = None
+    turning: bool = False
+    only: bool = False
+
+    @classmethod
+    def of(cls, points_m: Points, centroid_m: Points, fixed: bool) -> Known:
+        """Of all that is remembered of a thing."""
+        if not fixed:
+            return cls(centroid_m)
+        return cls(centroid_m, _cells(points_m), _box(points_m))
+
+    def with_view(self, seen: Known) -> Known:
+        """What is known with one more view of it."""
+        if seen.cells is None or self.cells is None:
+            return replace(seen, turning=self.turning)
+        return self.joined(seen)
+
+    def joined(self, other: Known) -> Known:
+        """A piece of furniture of which two parts are known."""
+        assert self.cells is not None and other.cells is not None, "both are furniture"
+        cells = np.union1d(self.cells, other.cells)
+        assert self.box_m is not None and other.box_m is not None, "with a box"
+        box_m = _box(np.concatenate([self.box_m, other.box_m]))
+        return replace(other, cells=cells, box_m=box_m, only=self.only)
+
+    def touches(self, box_m: Points) -> bool:
+        """Whether a box comes near the surface's."""
+        if self.box_m is None:
+            return False
+        apart = np.maximum(self.box_m[0] - box_m[1], box_m[0] - self.box_m[1])
+        return bool(apart.max() <= 2 * _CELL_M)
 
 
 def name_detections(
     detections: Sequence[Detection],
     clouds: Sequence[Cloud | None],
-    known: Mapping[str, Points],
-    reach_m: float,
+    known: Mapping[str, Known],
+    axis_m: Sequence[float],
+    config: PerceptionConfig,
+    reserved: Collection[str] = (),
 ) -> list[str]:
     """An instance name for every detection.
 
     Args:
         detections: of one frame; those with an instance keep it.
         clouds: where they are; None where depth is missing.
-        known: instance → centroid (3,) of everything located so far.
-        reach_m: farthest distance over which a detection is taken for a known object.
+        known: instance → where it is expected.
+        axis_m: where the robot stands.
+        config: how far off a thing may be, and how much of what a view shows must be known.
+        reserved: names that nothing gets for its place.
     """
     names = [d.instance or "" for d in detections]
     taken = {n for n in names if n}
@@ -39,19 +108,25 @@ def name_detections(
         mine = [i for i in open_ones if detections[i].category == category]
         mine.sort(key=lambda i: _order(clouds[i]))
         options = [n for n in sorted(known) if category_of(n) == category and n not in taken]
-        for i, name in _assigned(mine, options, clouds, known, reach_m).items():
+        located = {i: cloud for i in mine if (cloud := clouds[i]) is not None}
+        there = {n: known[n] for n in options}
+        for i, name in _assigned(located, there, np.asarray(axis_m), config).items():
             names[i] = name
             taken.add(name)
-        used = {n for n in (*known, *taken) if category_of(n) == category}
-        number = 1
+        used = {n for n in (*known, *taken, *reserved) if category_of(n) == category}
         for i in mine:
-            while not names[i]:
-                candidate = f"{category}-{number}"
-                number += 1
-                if candidate not in used:
-                    names[i] = candidate
-                    used.add(candidate)
+            if not names[i]:
+                names[i] = unused(category, used)
+                used.add(names[i])
     return names
+
+
+def unused(category: str, names: set[str]) -> str:
+    """The name of a category with the lowest number that nothing has."""
+    number = 1
+    while f"{category}-{number}" in names:
+        number += 1
+    return f"{category}-{number}"
 
 
 def _order(cloud: Cloud | None) -> tuple[float, ...]:
@@ -59,19 +134,107 @@ def _order(cloud: Cloud | None) -> tuple[float, ...]:
 
 
 def _assigned(
-    mine: Sequence[int],
-    options: Sequence[str],
-    clouds: Sequence[Cloud | None],
-    known: Mapping[str, Points],
-    reach_m: float,
+    clouds: Mapping[int, Cloud],
+    known: Mapping[str, Known],
+    axis_m: Points,
+    config: PerceptionConfig,
 ) -> dict[int, str]:
-    located = [i for i in mine if clouds[i] is not None]
-    if not located or not options:
+    """Detection → what it shows, where something is known there."""
+    if not clouds or not known:
         return {}
-    here = np.stack([c.centroid_m for i in located if (c := clouds[i]) is not None])
-    there = np.stack([known[n] for n in options])
-    distance = np.linalg.norm(here[:, None, :] - there[None, :, :], axis=2)
-    cost = np.where(distance <= reach_m, distance, _NEVER)
+    cost = np.array(
+        [[_cost(c, k, axis_m, config) for k in known.values()] for c in clouds.values()]
+    )
     rows, columns = linear_sum_assignment(cost)
+    numbers, names = list(clouds), list(known)
     pairs = [(int(r), int(c)) for r, c in zip(rows, columns, strict=True)]
-    return {located[r]: options[c] for r, c in pairs if cost[r, c] < _NEVER}
+    return {numbers[r]: names[c] for r, c in pairs if cost[r, c] < _NEVER}
+
+
+def _cost(cloud: Cloud, known: Known, axis_m: Points, config: PerceptionConfig) -> float:
+    """How little a detection looks like a known thing; `_NEVER` where it is another."""
+    if known.only:
+        return 0.0
+    if known.cells is not None:
+        if not known.touches(np.stack([cloud.low_m, cloud.high_m])):
+            return _NEVER
+        share = _shared(cloud.points_world_m, known.cells)
+        if share >= config.same_surface_share:
+            return 1.0 - share
+        return 1.0 - share / 2 if share >= _EDGE_SHARE and _is_side(cloud, known) else _NEVER
+    if known.turning:
+        here, there = (_around(p, axis_m) for p in (cloud.centroid_m, known.centroid_m))
+        away = float(np.linalg.norm(here - there))
+    else:
+        away = float(np.linalg.norm(cloud.centroid_m - known.centroid_m))
+    return away if away <= config.same_place_m else _NEVER
+
+
+def _is_side(cloud: Cloud, known: Known) -> bool:
+    """Whether a view shows a flat side of a piece of which other sides are known.
+
+    Furniture that stands in a row shows the same side.
+    """
+    size = cloud.high_m - cloud.low_m
+    across = int(np.argmin(size))
+    flat = size[across] < _FLAT * np.median(size)
+    known_m = np.zeros(3) if known.box_m is None else np.ptp(known.box_m, axis=0)
+    return bool(flat and known_m[across] > 2 * max(size[across], _CELL_M))
+
+
+def of_one_piece(
+    names: Sequence[str], clouds: Sequence[Cloud | None], known: Mapping[str, Known]
+) -> dict[str, str]:
+    """Names for a part of a piece of furniture → the name of the piece, of which a view shows both.
+
+    Args:
+        names: of a frame's detections; what a frame shows apart is not one.
+        clouds: where they are.
+        known: what is known with this frame.
+    """
+    found: dict[str, str] = {}
+    for name, cloud in zip(names, clouds, strict=True):
+        whole = known.get(name)
+        if cloud is None or whole is None or whole.cells is None:
+            continue
+        for other, part in known.items():
+            if other in names or other in found or category_of(other) != category_of(name):
+                continue
+            if part.cells is None or part.box_m is None or not whole.touches(part.box_m):
+                continue
+            if _share_of(part.cells, whole.cells) >= _PART_SHARE:
+                found[other] = name
+    return found
+
+
+def _around(point_m: Points, axis_m: Points) -> Points:
+    """How far from the robot's axis, and how high."""
+    return np.array([np.linalg.norm(point_m[:2] - axis_m[:2]), point_m[2]])
+
+
+def _cells(points_m: Points) -> Cells:
+    return np.unique(_keys(points_m))
+
+
+def _box(points_m: Points) -> Points:
+    return np.stack([points_m.min(axis=0), points_m.max(axis=0)])
+
+
+def _keys(points_m: Points) -> Cells:
+    cell = np.floor(points_m / _CELL_M).astype(np.int64) + (1 << (_BITS - 1))
+    keys: Cells = (cell[:, 0] << 2 * _BITS) + (cell[:, 1] << _BITS) + cell[:, 2]
+    return keys
+
+
+def _shared(points_m: Points, cells: Cells) -> float:
+    """The larger of the shares that what is seen and what is known have of each other."""
+    seen = _cells(points_m)
+    return max(_share_of(seen, cells), _share_of(cells, seen))
+
+
+def _share_of(some: Cells, others: Cells) -> float:
+    """The share of some cells that have one of the others beside them."""
+    thin = some[:: max(1, len(some) // _SAMPLES)]
+    near = thin[:, None] + _AROUND[None, :]
+    at = np.minimum(np.searchsorted(others, near), len(others) - 1)
+    return float((others[at] == near).any(axis=1).mean())

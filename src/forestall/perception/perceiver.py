@@ -7,22 +7,24 @@ each frame and `fuse.py` once for each observation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.forgetting import remove
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
 from forestall.perception.gate_config import GateConfig, WatchConfig
 from forestall.perception.gate_time import SenseWatch
-from forestall.perception.naming import name_detections
+from forestall.perception.naming import Known, name_detections
+from forestall.perception.own_names import expected, join_parts, known, named_hands
 from forestall.perception.scope import scope
 from forestall.perception.tracks import View
 from forestall.perception.unproject import (
     Cloud,
     Labels,
-    Points,
     clouds,
     label_image,
 )
@@ -31,7 +33,7 @@ from forestall.types.facts import category_of
 from forestall.types.feature import quantised
 from forestall.types.finding import Finding, refuse
 from forestall.types.graph import SceneGraph
-from forestall.types.observation import Detection, Frame, Observation
+from forestall.types.observation import Detection, Frame, Observation, Vec3
 from forestall.types.plan import Subtask
 
 _GATE = GateConfig()
@@ -96,16 +98,10 @@ class GraphPerceiver:
             raise PerceptionError(
                 "the observation has no picture, only a scene graph: use the perceiver given-graph"
             )
-        known: dict[str, Points] = {
-            n: t.centroid_m for n, t in self._memory.tracks.items() if t.points_world_m is not None
-        }
-        views = []
-        for frame, masks in zip(observation.frames, self._masks(observation), strict=True):
-            view = self._view(frame, masks, known)
-            for name, cloud in zip(view.ids, view.clouds, strict=True):
-                if cloud is not None:
-                    known[name] = cloud.centroid_m
-            views.append(view)
+        masked = self._masks(observation)
+        tracks, held = self._memory.tracks, self._memory.held
+        observation = named_hands(observation, tracks, held, self._domain)
+        views = self._views(observation, masked)
         self._memory.integrate(observation, views)
         if self._memory.forgotten:
             names = ", ".join(self._memory.forgotten)
@@ -141,7 +137,41 @@ class GraphPerceiver:
             refuse(self.findings)
         return masks
 
-    def _view(self, frame: Frame, masks: Masks, known: Mapping[str, Points]) -> View:
+    def _views(self, observation: Observation, masked: Sequence[Masks]) -> list[View]:
+        """Every frame with names for what it shows; what one frame tells the next ones know."""
+        kinds = {d.category for m in masked for d in m.detections if d.instance is None}
+        tracks, domain = self._memory.tracks, self._domain
+        places = expected(tracks, observation, domain, kinds)
+        axis_m, told = observation.robot_position_world_m, [n for n, _ in observation.told]
+        parts: dict[str, str] = {}
+        views: list[View] = []
+        for frame, masks in zip(observation.frames, masked, strict=True):
+            view = self._view(frame, masks, places, axis_m, told)
+            for name, category, cloud in zip(view.ids, view.categories, view.clouds, strict=True):
+                if cloud is not None:
+                    points = cloud.points_world_m
+                    seen = known(category, points, cloud.centroid_m, domain, kinds)
+                    places[name] = places[name].with_view(seen) if name in places else seen
+            views.append(view)
+            if kinds:
+                apart = [set(v.ids) for v in views]
+                parts |= join_parts(view, places, tracks, apart)
+        for part, whole in parts.items():
+            if part in tracks:
+                remove(tracks, part, whole)
+        return [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
+
+    def _is_fixture(self, category: str) -> bool:
+        return self._domain.is_a(category, self._domain.roles.fixture)
+
+    def _view(
+        self,
+        frame: Frame,
+        masks: Masks,
+        known: Mapping[str, Known],
+        axis_m: Vec3,
+        told: Collection[str],
+    ) -> View:
         detections, labels = masks.detections, masks.labels
         states = self._estimator.estimate(frame, detections)
         if len(states) != len(detections):
@@ -149,7 +179,7 @@ class GraphPerceiver:
                 f"the state estimator {self._estimator.name!r} answered for {len(states)} of "
                 f"{len(detections)} detections"
             )
-        fixed = [self._domain.is_a(d.category, self._domain.roles.fixture) for d in detections]
+        fixed = [self._is_fixture(d.category) for d in detections]
         voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in fixed]
         found = clouds(frame, labels, voxel_m, self._config, [not f for f in fixed])
         if self._gate is not None:
@@ -158,7 +188,7 @@ class GraphPerceiver:
                 None if d.score < least else cloud
                 for d, cloud in zip(detections, found, strict=True)
             ]
-        names = name_detections(detections, found, known, self._config.same_place_m)
+        names = name_detections(detections, found, known, axis_m, self._config, told)
         return View(
             frame=frame,
             labels=labels,
@@ -168,6 +198,9 @@ class GraphPerceiver:
             states=tuple(states),
             features=self._features(frame, detections, found),
             unlocated=tuple(_placeless(frame, detections, labels, found, known)),
+            guessed=frozenset(
+                n for n, d in zip(names, detections, strict=True) if d.instance is None
+            ),
         )
 
     def _features(
@@ -193,12 +226,18 @@ class GraphPerceiver:
         return tuple(features)
 
 
+def _whole(name: str, parts: Mapping[str, str]) -> str:
+    while name in parts:
+        name = parts[name]
+    return name
+
+
 def _placeless(
     frame: Frame,
     detections: Sequence[Detection],
     labels: Labels,
     found: Sequence[Cloud | None],
-    known: Mapping[str, Points],
+    known: Collection[str],
 ) -> Iterator[bool]:
     """Which detections show something that cannot be located, and that is not known already.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from forestall.errors import PerceptionError
 from forestall.perception.config import PerceptionConfig
-from forestall.types.facts import category_of
+from forestall.types.facts import category_of, is_instance
 from forestall.types.observation import Detection, Frame
 
 
@@ -22,6 +22,8 @@ class InstanceSegmenter:
 
     def segment(self, frame: Frame) -> Sequence[Detection]:
         """One detection for each instance with enough pixels, in name order.
+
+        Where the frame tells kinds alone, none bears a name.
 
         Raises:
             PerceptionError: the frame has no instance ids, or an id without a name.
@@ -39,7 +41,9 @@ class InstanceSegmenter:
             )
         found = np.flatnonzero(counts >= self._config.min_pixels)
         order = sorted((frame.instance_names[int(i)], int(i)) for i in found)
-        return [Detection(category_of(name), ids == i, instance=name) for name, i in order]
+        return [
+            Detection(category_of(n), ids == i, n if is_instance(n) else None) for n, i in order
+        ]
 
 
 class GivenMasks:

@@ -64,6 +64,7 @@ class View:
 
     `features` are None without an image encoder and for what has no cloud. `unlocated` tells what
     is seen and has no place, because no depth returned or the segmenter is not sure of its mask.
+    `guessed` are the ids that perception gave, and no segmenter that tracks.
     """
 
     frame: Frame
@@ -74,6 +75,19 @@ class View:
     states: tuple[Mapping[str, str | None], ...]
     features: tuple[bytes | None, ...]
     unlocated: tuple[bool, ...]
+    guessed: frozenset[str] = frozenset()
+
+
+def riding(tracks: Mapping[str, Track], name: str | None) -> set[str]:
+    """What is in or on a thing, at any depth."""
+    found: set[str] = set()
+    pending = [] if name is None else [name]
+    while pending:
+        top = pending.pop()
+        on = {n for n, t in tracks.items() if t.parent is not None and t.parent[1] == top} - found
+        found |= on
+        pending += sorted(on)
+    return found
 
 
 _MOST_POINTS = 6000

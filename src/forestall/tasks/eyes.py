@@ -103,7 +103,7 @@ class SharedEyes:
             gripper=replace(
                 gripper, holding=self._name(gripper.holding), released=self._name(gripper.released)
             ),
-            graph=None if observation.graph is None else self._graph(observation.graph),
+            graph=None if observation.graph is None else self.mistaken(observation.graph),
         )
 
     def _name(self, name: str | None) -> str | None:
@@ -113,7 +113,8 @@ class SharedEyes:
         names = tuple(self._names.get(n, n) for n in frame.instance_names)
         return replace(frame, instance_names=names)
 
-    def _graph(self, graph: SceneGraph) -> SceneGraph:
+    def mistaken(self, graph: SceneGraph) -> SceneGraph:
+        """A graph of what is, as this robot takes it."""
         names = self._names
         nodes = []
         for node in graph.nodes:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 from forestall.domain.model import Domain
 from forestall.planning.state import State
@@ -23,6 +24,17 @@ from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, When
 from forestall.types.task import Goal
+
+
+class Meanings(Protocol):
+    """Where perception has names of its own: what these truly mean."""
+
+    @property
+    def newest(self) -> Subtask | None:
+        """The newest command that was sent, in true names."""
+
+    def truly(self, subtask: Subtask, graph: SceneGraph) -> Subtask:
+        """What a subtask in the names of a graph would be done with now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +93,7 @@ class TruthTrace:
     Attributes:
         moments: one for each call of a strategy.
         left: likewise, and one more for the end of the run.
-        executed: every subtask that was executed.
+        executed: every subtask that was executed, in true names.
         nominal: the task's own plan. `planned`: the one that the run started with.
     """
 
@@ -92,11 +104,18 @@ class TruthTrace:
         self.nominal = self.planned = Plan(())
         self._domain: Domain | None = None
         self._leave: Callable[[Plan, Goal, int], Left] | None = None
+        self._meanings: Meanings | None = None
         self._succeeded = True
 
-    def attach(self, oracle: OracleView, domain: Domain) -> None:
-        """Say whose truth is meant; `assembly` does."""
-        self._domain = domain
+    def attach(self, oracle: OracleView, domain: Domain, meanings: Meanings | None = None) -> None:
+        """Say whose truth is meant; `assembly` does.
+
+        Args:
+            oracle: the truth.
+            domain: of the run.
+            meanings: of perception's names; those of the truth by default.
+        """
+        self._domain, self._meanings = domain, meanings
         self._leave = partial(self._left, oracle)
 
     def on_start(self, record: EpisodeRecord) -> None:
@@ -112,6 +131,9 @@ class TruthTrace:
         assert self._leave is not None and self._domain is not None, "attach() comes first"
         context = replace(context, index=context.index + self._done(context))
         rest = rest_of(context, self._domain)
+        if self._meanings is not None:
+            steps = (self._meanings.truly(s, context.graph) for s in rest)
+            rest = Plan(tuple(steps), rest.goal)
         driven = len(rest) - len(context.remaining())
         left = self._leave(rest, context.task.goal, driven)
         self.left.append(left)
@@ -119,7 +141,8 @@ class TruthTrace:
 
     def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A refused subtask is still to be done."""
-        self.executed.append(executed.subtask)
+        true = None if self._meanings is None else self._meanings.newest
+        self.executed.append(executed.subtask if true is None else true)
         self._succeeded = executed.outcome.status is SkillStatus.SUCCEEDED
 
     def on_end(self, record: EpisodeRecord) -> None:

@@ -13,12 +13,13 @@ from threading import Thread
 import numpy as np
 
 from forestall.domain.model import Domain
-from forestall.seams import Environment
+from forestall.seams import Environment, Unnamed
 from forestall.types.episode import SkillStatus
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
 
 NONSENSE = "NoSuchThing"
+NOWHERE_M = (99.0, 99.0, 99.0)
 
 HOLD_S = 5.0
 """How long `hold` may take."""
@@ -38,7 +39,8 @@ def check_environment(
     Returns:
         One sentence for each thing that is wrong: a run that does not repeat to the last bit, time
         that goes backwards or disagrees with reported durations, observations that are not valid,
-        nonsense that is not refused, an exception where a refusal is due, and motion after `hold`.
+        nonsense that is not refused, an exception where a refusal is due, motion after `hold`, and
+        for one that shares no names (`seams.Unnamed`) a thing taken where a name points at none.
     """
     first, second = make(), make()
     try:
@@ -48,6 +50,7 @@ def check_environment(
             ),
             *_repeats("two resets", _run(first, seed, subtasks), first, seed, subtasks),
             *_refuses_nonsense(first, seed, domain),
+            *_refuses_wrong_places(first, seed, domain),
             *_holds(first, seed, subtasks),
         ]
     finally:
@@ -141,6 +144,8 @@ def _differences(a: Observation, b: Observation) -> Iterator[str]:
             yield "instance_names"
     if a.graph != b.graph:
         yield "the scene graph"
+    if a.told != b.told:
+        yield "what somebody pointed at"
     if a.gripper != b.gripper:
         yield "the gripper"
     if a.robot_position_world_m != b.robot_position_world_m:
@@ -177,6 +182,19 @@ def _refuses_nonsense(environment: Environment, seed: int, domain: Domain) -> It
             yield f"{subtask} succeeds; it must be refused"
         elif not outcome.reason:
             yield f"{subtask} is refused without a reason"
+
+
+def _refuses_wrong_places(environment: Environment, seed: int, domain: Domain) -> Iterator[str]:
+    """Where a name points at nothing, nothing else is taken, and nothing is driven into."""
+    if not isinstance(environment, Unnamed):
+        return
+    environment.reset(seed)
+    for skill in domain.skills.values():
+        for category in domain.tagged(domain.roles.movable)[:1] if skill.parameters else ():
+            subtask = Subtask(skill.name, (f"{category}-1",) * len(skill.parameters))
+            outcome = environment.execute_at(subtask, {f"{category}-1": NOWHERE_M})
+            if outcome.status is SkillStatus.SUCCEEDED or not outcome.reason:
+                yield f"{subtask} is not refused with a reason where its place shows nothing"
 
 
 def _holds(environment: Environment, seed: int, subtasks: Sequence[Subtask]) -> Iterator[str]:

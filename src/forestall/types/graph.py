@@ -7,6 +7,7 @@ equal graphs have equal text, JSON and hashes.
 from __future__ import annotations
 
 import base64
+import math
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -59,6 +60,11 @@ class Box:
         """Midpoint."""
         (a, b, c), (d, e, f) = self.low, self.high
         return ((a + d) / 2, (b + e) / 2, (c + f) / 2)
+
+    def away_m(self, point_m: Vec3) -> float:
+        """How far a point is from the box, 0 within."""
+        edges = zip(self.low, point_m, self.high, strict=True)
+        return math.hypot(*(max(a - p, p - b, 0.0) for a, p, b in edges))
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +160,25 @@ class SceneGraph:
     def of_category(self, category: str) -> tuple[ObjectNode, ...]:
         """Every node of a category, in id order."""
         return tuple(n for n in self.nodes if n.category == category)
+
+    def places(self) -> dict[str, Vec3 | None]:
+        """Id → where it is believed to be, None where nobody knows."""
+        return {n.id: n.centroid_m for n in self.nodes}
+
+    def nearest(self, category: str, point_m: Vec3, within_m: float = math.inf) -> str | None:
+        """The node of a category whose box is nearest to a point; of several its middle.
+
+        Args:
+            category: of the node.
+            point_m: in the world.
+            within_m: how far its box may be from the point.
+        """
+        found = [
+            (away, math.dist(n.box_m.centre, point_m), n.id)
+            for n in self.of_category(category)
+            if n.box_m is not None and (away := n.box_m.away_m(point_m)) <= within_m
+        ]
+        return min(found, default=(0.0, 0.0, None))[2]
 
     @property
     def holding(self) -> str | None:

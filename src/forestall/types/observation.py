@@ -95,7 +95,8 @@ class Frame:
         instance_ids: optional (H, W) int32, index into `instance_names`, -1 for none. This is an
             instance *segmentation* (as simulators and trackers deliver); it carries names and
             categories of what is in view and no state of it.
-        instance_names: instance names such as "Mug-1", by index.
+        instance_names: instance names such as "Mug-1", by index; or "Mug" where nobody tracks, and
+            an index then means a thing of this picture alone.
         detections: masks that came with the frame from outside, if any.
         colour_only: nothing measured depth; `depth_m` is 0 everywhere, and whatever needs depth is
             unobserved.
@@ -168,7 +169,8 @@ class Frame:
 class GripperState:
     """The robot's own sense of its hand.
 
-    `holding` is the instance name of what is held as the robot knows it, None for an empty hand.
+    `holding` is the instance name of what is held as the robot knows it, or only its category where
+    it does not know more; None for an empty hand.
     `position_world_m` is where the hand is. `released` is what the subtask just executed let go on
     purpose, `released_world_m` where: the arm knows it, whether or not the camera sees it.
     `name` is the hand's node in the graph, one of the domain's hands. `told` is False for a robot
@@ -211,6 +213,8 @@ class Observation:
         robot_position_world_m: where the robot stands.
         graph: what is in view as a scene graph, from a source that needs no pictures.
         others: further hands.
+        told: names that somebody has given to things by pointing at them: the thing, of the name's
+            category, at a point in the world bears this name.
 
     Raises:
         PerceptionError: neither a frame nor a graph.
@@ -222,12 +226,16 @@ class Observation:
     robot_position_world_m: Vec3 = (0.0, 0.0, 0.0)
     graph: SceneGraph | None = None
     others: tuple[GripperState, ...] = ()
+    told: tuple[tuple[str, Vec3], ...] = ()
 
     def __post_init__(self) -> None:
         check_several("frames", self.frames, Frame)
         check_several("hands", (self.gripper, *self.others), GripperState)
         check_number("time_s", self.time_s)
         check_point("robot_position_world_m", self.robot_position_world_m)
+        for name, point in self.told:
+            check_name("a name that somebody gave", name)
+            check_point(f"where {name} was pointed at", point)
         if not self.frames and self.graph is None:
             raise PerceptionError("an observation needs at least one frame, or a scene graph")
         names = [hand.name for hand in self.hands]

@@ -9,7 +9,7 @@ from forestall.errors import UnknownNameError
 from forestall.types.scene import SceneNeeds
 from forestall.worlds.kitchen import part
 from forestall.worlds.kitchen.environment import KitchenEnvironment
-from forestall.worlds.kitchen.part import Kitchens
+from forestall.worlds.kitchen.part import Kitchens, NamesOption, Profile
 
 
 def test_an_unknown_renderer_is_named_before_a_kitchen_is_built() -> None:
@@ -38,3 +38,20 @@ def test_it_says_what_of_it_works_here() -> None:
     found = Kitchens().check()
     assert [w.needed for w in found] == [True, *[False] * (len(found) - 1)]
     assert {w.what for w in found[1:]} >= {"renderer embree", "renderer rays"}
+
+
+@pytest.mark.parametrize(
+    ("profile", "names", "shared"),
+    [
+        (Profile.KIND, NamesOption.PROFILE, True),
+        (Profile.KIND, NamesOption.OWN, False),
+        (Profile.HONEST, NamesOption.PROFILE, False),
+        (Profile.HONEST, NamesOption.SHARED, True),
+    ],
+)
+def test_whose_names_things_bear_is_an_option(
+    profile: Profile, names: NamesOption, shared: bool
+) -> None:
+    kitchens = Kitchens(profile=profile, names=names)
+    with kitchens.open(SceneNeeds(), shipped("household")) as opened:
+        assert opened.shares_names is shared

@@ -26,6 +26,7 @@ class OpenKitchen:
     """Implements `OpenWorld`."""
 
     environment: KitchenEnvironment
+    shares_names: bool = True
 
     @property
     def oracle(self) -> KitchenOracle:
@@ -60,6 +61,14 @@ class Rooms(Enum):
     ITHOR = "ithor"
 
 
+class NamesOption(Enum):
+    """Whether perception is given the simulator's names of things."""
+
+    PROFILE = "profile"
+    SHARED = "shared"
+    OWN = "own"
+
+
 class Kitchens:
     """Implements `WorldPart`.
 
@@ -71,6 +80,8 @@ class Kitchens:
             the profile has it.
         rates: how often skills go wrong, for the profile "honest".
         rooms: "own" (drawn from the seed), or "ithor" (after seven rooms of AI2-THOR).
+        names: whose names the robot has of things: "shared" with the simulator, its "own", or as
+            the profile has it: shared in the kind one, its own in the honest one.
 
     Raises:
         UnknownNameError: no such renderer.
@@ -86,6 +97,7 @@ class Kitchens:
         law: LawOption = LawOption.PROFILE,
         rates: Rates | None = None,
         rooms: Rooms = Rooms.OWN,
+        names: NamesOption = NamesOption.PROFILE,
     ) -> None:
         if renderer not in RENDERERS:
             raise UnknownNameError("renderer", renderer, RENDERERS)
@@ -97,6 +109,8 @@ class Kitchens:
         drawn = honest if law is LawOption.PROFILE else law is LawOption.DRAWN
         self._ways = WAYS if drawn else ()
         self._draws = draws() if rooms is Rooms.ITHOR else None
+        own = honest if names is NamesOption.PROFILE else names is NamesOption.OWN
+        self._shares_names = not own
         self._frames = FrameMemory()
 
     @contextmanager
@@ -115,7 +129,7 @@ class Kitchens:
             draws=self._draws,
         )
         try:
-            yield OpenKitchen(kitchen)
+            yield OpenKitchen(kitchen, self._shares_names)
         finally:
             kitchen.close()
 
