@@ -79,7 +79,7 @@ def test_a_failing_run_is_repaired_with_the_ready_made_memory() -> None:
 def test_a_ready_made_memory_is_of_the_parts_that_it_is_recorded_with(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    import forestall.assembly.demonstrations as module
+    import forestall.assembly.recording as module
 
     made = record_one(RecordingJob("toast-bread", DEMONSTRATION_SEEDS, PLAIN))
     recorded: list[RecordingJob] = []
