@@ -16,7 +16,7 @@ from forestall.assembly.configuration import Given
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, EFFORT, ROWS, ResultsFolder, episodes_in
-from forestall.experiments.runs import Choice, Run, Settings, by_scene, runs_for
+from forestall.experiments.runs import PART, Choice, Run, Settings, by_scene, runs_for
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
 
@@ -78,13 +78,18 @@ def test_a_quick_experiment_is_a_balanced_tenth() -> None:
     quick, usual, whole = (
         runs_for(Choice("all", **how)) for how in ({"quick": True}, {}, {"part": 1.0})
     )
-    for some, part in ((quick, 0.03), (usual, 0.3), (whole, 1.0)):
+    for some, part in ((quick, PART / 10), (usual, PART), (whole, 1.0)):
         for of in (*CASE_SETS, *FURTHER_SETS):
             every = cases(of, "test", further=True)
             found = {r.case for r in some if r.case.set == of and r.profile == "honest"}
-            assert len(found) == max(1, round(len(every) * part))
+            share = {quick: 0.1}.get(some, 1.0) if of == "undisturbed" else part
+            assert len(found) == max(1, round(len(every) * share))
             assert len({c.task for c in found}) == min(len(found), len({c.task for c in every}))
     assert {r.case for r in quick} <= {r.case for r in usual} <= {r.case for r in whole}
+    honest = {r.case for r in usual if r.profile == "honest"}
+    long = {"long", "long-undisturbed"}
+    assert {c.twin for c in honest if c.set not in long} <= honest
+    assert len({(c.task, c.seed) for c in honest if c.set != "undisturbed"}) > 60, "many rooms"
 
 
 def test_what_is_not_possible_is_said_with_what_is() -> None:

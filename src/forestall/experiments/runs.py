@@ -19,7 +19,7 @@ from forestall.assembly.registry import find
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, STRATEGY
-from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
+from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, UNDISTURBED, Case, cases
 from forestall.statistics.judges import THRESHOLDS
 from forestall.statistics.rows import EXACT, HONEST, KIND, PLAIN, Setup
 from forestall.statistics.watches import PAPER_SET
@@ -48,11 +48,16 @@ IRREVERSIBLE = "irreversible"
 DEMONSTRATIONS = 8
 """Of each task in the honest household."""
 
-PART = 0.3
-"""Of the cases of each set in "all", so that it ends within an hour on two cores."""
+PART = 0.15
+"""Of the cases of each set in "all", so that it ends within an hour on two cores. The undisturbed
+runs of the honest household are all among them: they are every other case's twin."""
 
-STEPPING_IN = 0.25
+STEPPING_IN = 1 / 6
 """Of these, in the honest household, those in which strategies step in."""
+
+TURN = 3
+"""By so many cases the sets of the honest household are apart, so that a part of each has rooms of
+its own."""
 
 ABLATED = 0.5
 """Of RoboFail's cases in "all", those that are run without reasoning or validation, too."""
@@ -251,19 +256,23 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
     """The cases of every set that is run in a household."""
     honest = profile == HONEST
     found = {}
-    for of in (*CASE_SETS, *FURTHER_SETS) if honest else CASE_SETS:
+    for place, of in enumerate((*CASE_SETS, *FURTHER_SETS) if honest else CASE_SETS):
         every: Sequence[Case] = cases(of, choice.split, choice.rounds, further=honest)
-        if choice.experiment == "all":
-            every = _some(every, choice.part * (QUICK if choice.quick else 1))
-        elif choice.quick:
-            every = _some(every, QUICK)
+        part = 1.0 if choice.experiment != "all" or (honest and of == UNDISTURBED) else choice.part
+        if choice.quick:
+            part *= QUICK
+        if part < 1:
+            every = _some(every, part, TURN * place if honest else 0)
         found[of] = _limited(every, choice.limit)
     return found
 
 
-def _some(found: Sequence[Case], part: float) -> Sequence[Case]:
-    """A balanced part of the cases of a set, at least one: so many of every task."""
-    return _limited(found, max(1, round(len(found) * part)))
+def _some(found: Sequence[Case], part: float, turn: int = 0) -> Sequence[Case]:
+    """A balanced part of the cases of a set, at least one: so many of every task.
+
+    `turn`: with which case of each task it begins; whatever it is, a smaller part is in a larger.
+    """
+    return _limited(found, max(1, round(len(found) * part)), turn)
 
 
 def _check(choice: Choice) -> None:
@@ -299,12 +308,15 @@ def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
     ]
 
 
-def _limited(found: Sequence[Case], limit: int | None) -> Sequence[Case]:
+def _limited(found: Sequence[Case], limit: int | None, turn: int = 0) -> Sequence[Case]:
     if limit is None:
         return found
     of_task: dict[str, list[Case]] = {}
     for case in found:
         of_task.setdefault(case.task, []).append(case)
+    for task, several in of_task.items():
+        first = turn % len(several)
+        of_task[task] = several[first:] + several[:first]
     most = max(map(len, of_task.values()), default=0)
     in_turn = [several[k] for k in range(most) for several in of_task.values() if k < len(several)]
     return in_turn[:limit]
