@@ -261,13 +261,14 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, dict[str,
 
 def test_two_households_stand_side_by_side(two: tuple[Path, Page, dict[str, Any]]) -> None:
     folder, page, made = two
-    asked, beside = tables(made)[:2]
+    asked, beside, acted = tables(made)[:3]
     assert (asked.name, beside.name) == ("sentences", "side-by-side")
+    assert acted.name == "strategies-side-by-side"
     assert [row[0] for row in asked.rows] == [str(k) for k in range(1, 11)]
     assert DASH not in {c for row in asked.rows for c in row}, "all ten are measured in both"
     first = page.words.index(asked.title)
     assert first < page.words.index(beside.title) < page.words.index("What was run")
-    for cell in (c for row in (*asked.rows, *beside.rows) for c in row):
+    for cell in (c for row in (*asked.rows, *beside.rows, *acted.rows) for c in row):
         assert cell in page.words
     assert {p.stem for p in (folder / "figures").glob("*")} == {*FIGURES, "demonstrations"}
     for path in (folder / "figures").glob("*.svg"):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from forestall.experiments.cost import Cost
     from forestall.statistics.tables import Table
 
-MAIN_TABLES = ("sentences", "side-by-side")
+MAIN_TABLES = ("sentences", "side-by-side", "strategies-side-by-side")
 """Printed; all of them are in the folder."""
 
 Flag = Annotated[bool, Parameter(negative="")]
@@ -60,7 +60,7 @@ class Options:
     sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     profiles: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
-    part: float = 0.15
+    part: float = 0.12
     quick: Flag = False
     demonstrations: int = 8
     out: Path | None = None

@@ -5,10 +5,10 @@ Called by `tables`; reads a whole summary.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from forestall.statistics.cells import DASH, Columns, Names, Table, cells, shown
+from forestall.statistics.cells import Columns, Names, Table, cells, heads, shown
 from forestall.statistics.further_tables import ACTED, FALSE_NOTE, JUDGED
 from forestall.statistics.judges import (
     LITERAL,
@@ -29,39 +29,54 @@ from forestall.statistics.rows import EXACT, HONEST, KIND
 COLUMNS = (KIND, HONEST)
 
 
-def side_by_side(summary: Mapping[str, Any], names: Names) -> Table:
-    """One line for each judge or strategy and measure; what neither household has is left out."""
+def side_by_side(summary: Mapping[str, Any], names: Names) -> tuple[Table, Table]:
+    """Judges, and strategies: a line for each in each household, kind above honest."""
     contents = {p: summary["profiles"].get(p) for p in COLUMNS}
     there = [c for c in contents.values() if c is not None]
     judges = dict.fromkeys(n for c in there for n in c["detectors"] if _told(n))
     known = {n for c in there for n in c["shared"]["strategies"]}
     acted = [s for s in (*SIMPLE, *sorted(known - set(SIMPLE))) if s in known]
-    rows: list[tuple[str, ...]] = []
-    for name in sorted(judges, key=_place):
-        found = [c and c["detectors"].get(name) for c in contents.values()]
-        rows += _lines(shown(name, names), found, JUDGED)
-    for name in acted:
-        found = [c and c["shared"]["strategies"].get(name) for c in contents.values()]
-        rows += _lines(shown(name, names), found, ACTED)
     cases = ", ".join(f"{c['shared']['cases']} {p}" for p, c in contents.items() if c is not None)
-    return Table(
-        "side-by-side",
-        "The kind and the honest household side by side",
-        ("judge or strategy", "measure", *COLUMNS),
-        tuple(rows),
-        f"Judges in runs that nobody interrupts, each at its own threshold. {FALSE_NOTE} In time: "
-        "of the failures that can be known before the harm is done. Strategies on the cases that "
-        f"all of them were run on ({cases}).",
+    return (
+        Table(
+            "side-by-side",
+            "Judges in the kind and in the honest household",
+            ("judge", "household", *heads(JUDGED)),
+            tuple(
+                line
+                for name in sorted(judges, key=_place)
+                for line in _lines(name, names, contents, lambda c: c["detectors"], JUDGED)
+            ),
+            f"In runs that nobody interrupts, each at its own threshold. {FALSE_NOTE} In time: of "
+            "the failures that can be known before the harm is done.",
+        ),
+        Table(
+            "strategies-side-by-side",
+            "Strategies in the kind and in the honest household",
+            ("strategy", "household", *heads(ACTED)),
+            tuple(
+                line
+                for name in acted
+                for line in _lines(
+                    name, names, contents, lambda c: c["shared"]["strategies"], ACTED
+                )
+            ),
+            f"On the cases that all strategies of a household were run on ({cases}).",
+        ),
     )
 
 
 def _lines(
-    name: str, found: list[Mapping[str, Any] | None], columns: Columns
+    name: str,
+    names: Names,
+    contents: Mapping[str, Any],
+    part: Callable[[Any], Mapping[str, Any]],
+    columns: Columns,
 ) -> Iterator[tuple[str, ...]]:
-    each = [cells(metrics or {}, columns) for metrics in found]
-    for (measure, _, _), *values in zip(columns, *each, strict=True):
-        if any(value != DASH for value in values):
-            yield name, measure, *values
+    """What is known of a judge or strategy, household by household."""
+    for household, content in contents.items():
+        if content is not None and name in part(content):
+            yield shown(name, names), household, *cells(part(content)[name], columns)
 
 
 def _told(name: str) -> bool:

@@ -53,7 +53,7 @@ def tables(summary: Mapping[str, Any], names: Names | None = None) -> tuple[Tabl
     names = summary["names"] if names is None else names
     first = summary["shown"]
     notes = [f"{DASH}: not measured.", *(f"{n}." for n in summary["episodes"]["notes"])]
-    found = [told(summary), side_by_side(summary, names)]
+    found = [told(summary), *side_by_side(summary, names)]
     for profile, content in summary["profiles"].items():
         made = of_profile(content, names)
         found += made if profile == first else [t.of(profile) for t in made]
