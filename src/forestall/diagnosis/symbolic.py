@@ -202,13 +202,16 @@ def _blockers(graph: SceneGraph, name: str, domain: Domain) -> tuple[str, ...]:
 
 
 def _closed(graph: SceneGraph, name: str, domain: Domain) -> str:
-    for parent in graph.parents(name, domain.containing):
-        node = graph.get(parent)
-        if node is not None and is_shut(domain, node.category, dict(node.states)) is Truth.TRUE:
-            return parent
-        above = _closed(graph, parent, domain)
-        if above:
-            return above
+    """What shuts a thing in, the nearest first; two things may be taken to hold each other."""
+    pending, known = [name], {name}
+    while pending:
+        for parent in graph.parents(pending.pop(), domain.containing):
+            node = graph.get(parent)
+            if node is not None and is_shut(domain, node.category, dict(node.states)) is Truth.TRUE:
+                return parent
+            if parent not in known:
+                known.add(parent)
+                pending.append(parent)
     return ""
 
 
