@@ -81,7 +81,7 @@ def calibration_figure(panels: Sequence[Panel], level: float) -> bytes:
 
 
 def _panel(axes: Axes, panel: Panel, parts: Sequence[str], named: bool) -> None:
-    rows = [(task, row) for task, own in panel.tasks for row in own]
+    rows = [(task if i == 0 else "", row) for task, own in panel.tasks for i, row in enumerate(own)]
     axes.set_title(panel.judge)
     for place, (_, row) in enumerate(rows):
         y, index = len(rows) - 1 - place, parts.index(row.part)
