@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
@@ -24,6 +24,9 @@ from forestall.errors import InputError
 NINETEEN = [0.50 + 0.02 * i for i in range(19)]
 SCORES = st.lists(
     st.floats(0, 1).map(lambda x: round(x, 2)) | st.just(NOT_JUDGED), min_size=1, max_size=60
+)
+patiently = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 LEVELS = st.floats(0.005, 0.995)
 
@@ -73,7 +76,7 @@ def test_where_little_was_judged_the_line_is_not_above_what_was_seen() -> None:
 def test_coverage_on_exchangeable_scores(n: int, level: float) -> None:
     """The share of alarms is within a binomial bound of floor((n + 1) level) / (n + 1)."""
     rng = np.random.default_rng(12)
-    draws = 4000
+    draws = 2000
     alarms = 0
     for _ in range(draws):
         common = rng.normal()  # exchangeable, not independent
@@ -86,6 +89,7 @@ def test_coverage_on_exchangeable_scores(n: int, level: float) -> None:
     assert binom.ppf(1e-4, draws, exact) <= alarms <= binom.ppf(1 - 1e-4, draws, exact)
 
 
+@patiently
 @given(SCORES, LEVELS, st.floats(0, 1))
 def test_an_alarm_is_a_p_value_of_at_most_the_level(
     scores: list[float], level: float, new: float
@@ -98,6 +102,7 @@ def test_an_alarm_is_a_p_value_of_at_most_the_level(
         assert new >= max((s for s in scores if s < NOT_JUDGED), default=-math.inf)
 
 
+@patiently
 @given(SCORES)
 def test_a_larger_level_has_no_lower_line(scores: list[float]) -> None:
     lines = [threshold(scores, level) for level in np.linspace(0.01, 0.99, 25)]
@@ -105,6 +110,7 @@ def test_a_larger_level_has_no_lower_line(scores: list[float]) -> None:
     assert all(a <= b for a, b in pairwise(numbers))
 
 
+@patiently
 @given(SCORES, LEVELS, st.integers(0, 59), st.floats(0, 0.5))
 def test_a_worse_good_run_never_raises_the_line(
     scores: list[float], level: float, place: int, by: float

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
@@ -25,6 +25,9 @@ def matrices(draw: st.DrawFn) -> npt.NDArray[np.float64]:
     return np.where(rng.random(size) < draw(st.sampled_from([0.0, 0.2])), NOT_JUDGED, found)
 
 
+patiently = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 LEVELS = st.floats(0.01, 0.9)
 SHARES = st.lists(st.sampled_from([1 / 6, 1 / 3, 1 / 2, 1.0]), min_size=3, max_size=3)
 
@@ -52,6 +55,7 @@ def test_good_runs_without_a_score_of_a_part_do_not_fill_its_budget() -> None:
     assert thresholds(runs, [1, 1], 0.05) == (0.5, None)
 
 
+@patiently
 @given(matrices(), LEVELS)
 def test_one_column_is_the_plain_quantile(runs: npt.NDArray[np.float64], level: float) -> None:
     column = runs[:, :1]
@@ -62,6 +66,7 @@ def test_one_column_is_the_plain_quantile(runs: npt.NDArray[np.float64], level: 
         assert smallest_level(column, [1.0], 0) == conformal.smallest_level(len(column))
 
 
+@patiently
 @given(matrices(), SHARES, LEVELS)
 def test_it_alarms_wherever_bonferroni_would(
     runs: npt.NDArray[np.float64], shares: list[float], level: float
@@ -73,6 +78,7 @@ def test_it_alarms_wherever_bonferroni_would(
         assert plain is None or (line is not None and line >= plain)
 
 
+@patiently
 @given(matrices(), SHARES, st.lists(st.integers(0, 12), min_size=3, max_size=3), st.integers(0, 2))
 def test_a_stranger_run_is_never_less_rare(
     runs: npt.NDArray[np.float64], shares: list[float], new: list[int], place: int
@@ -84,6 +90,7 @@ def test_a_stranger_run_is_never_less_rare(
     assert p_value(runs, shares[:columns], lower) <= p_value(runs, shares[:columns], row)
 
 
+@patiently
 @given(matrices(), SHARES, LEVELS, st.lists(st.integers(-1, 13), min_size=3, max_size=3))
 def test_below_any_line_is_a_p_value_of_at_most_the_level(
     runs: npt.NDArray[np.float64], shares: list[float], level: float, new: list[int]
@@ -98,7 +105,7 @@ def test_below_any_line_is_a_p_value_of_at_most_the_level(
 @pytest.mark.parametrize(("n", "level"), [(59, 0.05), (40, 0.2)])
 def test_all_judges_together_keep_to_the_level(n: int, level: float) -> None:
     rng = np.random.default_rng(3)
-    draws, alarms, rare = 1500, 0, 0
+    draws, alarms, rare = 800, 0, 0
     for _ in range(draws):
         bag = drawn(rng, n + 1)
         lines = thresholds(bag[:n], [2, 2, 1], level)
@@ -110,7 +117,7 @@ def test_all_judges_together_keep_to_the_level(n: int, level: float) -> None:
     assert rare >= draws * level / 2  # the budget is spent, not saved
 
 
-@settings(max_examples=25)
+@patiently
 @given(st.integers(1, 200), st.integers(1, 4))
 def test_the_runs_that_a_level_needs_suffice(seed: int, columns: int) -> None:
     """Without ties, and whatever the columns have to do with each other."""
