@@ -205,3 +205,22 @@ def test_the_command_writes_file_and_picture(
     assert call([*args, "--judge", "image"]) == 2
     assert "unknown judge that can be calibrated 'image'" in capsys.readouterr().err
     assert call(["calibrate", str(memory), "--level", "2"]) == 2
+
+
+@pytest.mark.parametrize("detector", ["scene-graph", "preconditions"])
+def test_of_all_that_watch_only_the_runs_own_detector_is_calibrated(
+    demonstrations: list[Demonstration], tmp_path: Path, detector: str
+) -> None:
+    file = tmp_path / "calibration.toml"
+    given = Given.named({"detector.name": detector})
+    write_calibration(file, calibrate(demonstrations, given, level=0.2))
+    said = {"name": detector, "calibration": file}
+    config = run_config(TASK, seed=3, given=SYMBOLIC, detector=said, strategy="watch")
+    record = run_episode(prepare(config), demonstrations)
+    calibrated = {
+        v.detector
+        for b in record.boundaries
+        for v in b.watched
+        if v.calibration is Calibration.CALIBRATED
+    }
+    assert calibrated == {detector}

@@ -14,7 +14,7 @@ TURN, BREAK = "turn", "break"
 
 
 def run(name: str, task: str, score: float, alarm: bool = False) -> JudgedRun:
-    """Before a reversible skill it fits as well as `score`, before the other one a little better."""
+    """Before a reversible skill it fits as well as `score`, before the other a little better."""
     return JudgedRun(
         name,
         task,

@@ -25,9 +25,7 @@ NINETEEN = [0.50 + 0.02 * i for i in range(19)]
 SCORES = st.lists(
     st.floats(0, 1).map(lambda x: round(x, 2)) | st.just(NOT_JUDGED), min_size=1, max_size=60
 )
-patiently = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
+patiently = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 LEVELS = st.floats(0.005, 0.995)
 
 

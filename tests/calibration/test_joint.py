@@ -25,9 +25,7 @@ def matrices(draw: st.DrawFn) -> npt.NDArray[np.float64]:
     return np.where(rng.random(size) < draw(st.sampled_from([0.0, 0.2])), NOT_JUDGED, found)
 
 
-patiently = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
+patiently = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 LEVELS = st.floats(0.01, 0.9)
 SHARES = st.lists(st.sampled_from([1 / 6, 1 / 3, 1 / 2, 1.0]), min_size=3, max_size=3)
 
@@ -59,9 +57,7 @@ def test_good_runs_without_a_score_of_a_part_do_not_fill_its_budget() -> None:
 @given(matrices(), LEVELS)
 def test_one_column_is_the_plain_quantile(runs: npt.NDArray[np.float64], level: float) -> None:
     column = runs[:, :1]
-    assert thresholds(column, [1.0], level) == (
-        conformal.threshold(column[:, 0].tolist(), level),
-    )
+    assert thresholds(column, [1.0], level) == (conformal.threshold(column[:, 0].tolist(), level),)
     if (column < NOT_JUDGED).any():
         assert smallest_level(column, [1.0], 0) == conformal.smallest_level(len(column))
 

@@ -279,7 +279,7 @@ def watch(
         for switch in SWITCHES.values()
     ]
     others: list[Detector] = [
-        parts.part(DETECTOR, name, **_shared(parts, name))
+        parts.part(DETECTOR, name, **_shared(parts, name, calibrated=True))
         for name in parts.declared(DETECTOR)
         if name != paper
     ]
@@ -339,10 +339,11 @@ def _with_few(parts: Parts, count: int) -> list[DetectorJudge]:
 def _shared(parts: Parts, name: str, calibrated: bool = False) -> dict[str, Any]:
     """Options given to the run's detector that another has, too, the ablations apart.
 
-    A calibration is of one detector with all that it compares with: only `calibrated` ones have it.
+    A calibration is of one detector with all that it compares with: only the run's own may have it.
     """
     known = parts.declared(DETECTOR, name)
-    own = (*SWITCHES.values(), *(() if calibrated else ("calibration",)))
+    keeps = calibrated and parts.name(DETECTOR) == name
+    own = (*SWITCHES.values(), *(() if keeps else ("calibration",)))
     return {
         option: value
         for option, value in parts.given(DETECTOR).items()

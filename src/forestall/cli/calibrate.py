@@ -100,11 +100,14 @@ def calibrate(
     return 0
 
 
-def _groups(table: CalibrationTable) -> list[tuple[str, Fit]]:
-    """Every task, or all, with the thresholds that serve it."""
+def _groups(table: CalibrationTable) -> list[tuple[str, Fit, Fit]]:
+    """Every task, or all, with the thresholds that serve it and those of its own runs."""
     if not table.by_task:
-        return [("all tasks", table.fit(None))]
-    return [(task or "no task", table.fit(task)) for task in sorted(set(table.scores.tasks))]
+        return [("all tasks", table.fit(None), table.fit_of(None, divided=False))]
+    return [
+        (task or "no task", table.fit(task), table.fit_of(task, divided=False))
+        for task in sorted(set(table.scores.tasks))
+    ]
 
 
 def _say_fits(table: CalibrationTable, scenes: int) -> None:
@@ -112,8 +115,7 @@ def _say_fits(table: CalibrationTable, scenes: int) -> None:
     from forestall.calibration.conformal import runs_needed
 
     rows: list[tuple[str, ...]] = []
-    for task, fit in _groups(table):
-        own = table.fit_of(task if task in table.scores.tasks else None, divided=False)
+    for task, fit, own in _groups(table):
         for line in fit.lines:
             judged = [e for e in line.extremes if e < float("inf")]
             counted = line.column.judge in (COUNTED, PLAN_CHECK)
@@ -190,7 +192,7 @@ def _panels(table: CalibrationTable) -> list[Panel]:
             tuple(
                 (task if fit.task or not table.by_task else f"{task} (by all tasks)",
                  rows(fit, judge))
-                for task, fit in _groups(table)
+                for task, fit, _ in _groups(table)
             ),
             judge in (COUNTED, PLAN_CHECK),
         )
