@@ -81,7 +81,7 @@ def test_coverage_on_exchangeable_scores(n: int, level: float) -> None:
         scores = common + rng.standard_t(2, size=n + 1)
         line = threshold(scores[:n].tolist(), level)
         assert line is not None
-        alarms += scores[n] < line
+        alarms += bool(scores[n] < line)
     exact = math.floor((n + 1) * level + 1e-9) / (n + 1)
     assert exact <= level
     assert binom.ppf(1e-4, draws, exact) <= alarms <= binom.ppf(1 - 1e-4, draws, exact)

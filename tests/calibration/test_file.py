@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from calibration_tables import runs, table
 
-from calibration.tables import runs, table
 from forestall.calibration.file import calibration_toml, read_calibration, write_calibration
 from forestall.calibration.scores import JudgedRun, Parts
 from forestall.errors import FileFormatError

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from calibration_tables import BREAK, TURN, run, runs, table
 
-from calibration.tables import BREAK, TURN, run, runs, table
 from forestall.calibration import conformal
 from forestall.calibration.conformal import NOT_JUDGED
 from forestall.calibration.scores import Column, JudgedRun, Parts, Scores, scores_of
