@@ -139,7 +139,8 @@ def judge_stored(
     if demonstrations is not None:
         seeing = Assembly(config.choices, domain, None, {"states": stated}).part(PERCEIVER)
         demonstrations = scoped(demonstrations, seeing.scope)
-    parts = Assembly(config.choices, domain, demonstrations, {"states": stated})
+    lent = {"states": stated, "task": task.name}
+    parts = Assembly(config.choices, domain, demonstrations, lent)
     bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
     strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)
     monitor = Monitor(strategy, domain, perceiver, bounds)

@@ -194,7 +194,8 @@ def make_runtime(
     """The loop around an open world."""
     config, domain = prepared.config, prepared.loaded.domain
     known = prepared.model or domain
-    parts = Assembly(config.choices, known, demonstrations, {"truth": world.oracle})
+    lent = {"truth": world.oracle, "task": prepared.loaded.task.name}
+    parts = Assembly(config.choices, known, demonstrations, lent)
     return Runtime(
         environment,
         parts.part(PERCEIVER),

@@ -10,6 +10,7 @@ from cyclopts import App
 import forestall
 from forestall.cli import experiments
 from forestall.cli.bench import bench
+from forestall.cli.calibrate import calibrate
 from forestall.cli.cases import cases
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
@@ -29,7 +30,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
+for command in (run, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
 app.command(demos)
 app.command(domain)
