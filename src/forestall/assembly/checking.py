@@ -7,7 +7,6 @@ followed. Composition like `make`, for `forestall check`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,13 +15,14 @@ from typing import Any
 from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
 from forestall.assembly.make import STORED_STATES, provenance
 from forestall.assembly.parts import Assembly
+from forestall.assembly.plans import fitting, read_plan
 from forestall.assembly.registry import known
 from forestall.assembly.sources import scoped
 from forestall.assembly.stored import Stored, is_graph, read_scene, scenes_in
 from forestall.conclusion import MonitorConfig, unlocated
 from forestall.domain.model import Domain
-from forestall.domain.words import Names, Words
-from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.domain.words import Names
+from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import PERCEIVER, STATES, STRATEGY
 from forestall.monitor import Monitor
 from forestall.seams import Strategy
@@ -56,7 +56,7 @@ class Question:
 
     Args:
         subtask: in text form: the same one for every scene. None: the plan's, one after the other.
-        plan: "step; step", or the path of a file with one step a line; the task's by default.
+        plan: "step; step", or a file (`assembly.plans`); the task's by default.
         task: name or file; its own demonstrations are preferred, and its goal is kept.
     """
 
@@ -129,7 +129,7 @@ def judge_stored(
     task, domain = _task(question, config, demonstrations)
     wanted = None
     if question.subtask is not None:
-        wanted = _fitting(Subtask.parse(question.subtask), domain)
+        wanted = fitting(Subtask.parse(question.subtask), domain)
     if wanted is None and len(scenes) > len(task.plan):
         raise InputError(
             f"{len(scenes)} scenes for the {len(task.plan)} subtasks of the plan: give one for "
@@ -221,50 +221,12 @@ def _task(
         if not len(task.plan):
             raise InputError("say before what: --subtask STEP, --plan 'STEP; STEP' or --task NAME")
         return task, domain
-    wanted = _fitting(Subtask.parse(question.subtask), domain)
+    wanted = fitting(Subtask.parse(question.subtask), domain)
     if not any(same_step(step, wanted) for step in task.plan):
         if question.plan is not None:
             raise UnknownNameError("step of the plan", str(wanted), task.plan.texts())
         task = replace(task, goal=Goal(""), plan=Plan((wanted,)))
     return task, domain
-
-
-def read_plan(text_or_file: str, domain: Domain) -> Plan:
-    """A plan of "step; step", or of a file with one step a line; "#" begins a comment.
-
-    Raises:
-        FileFormatError: the file cannot be read.
-        InputError: no step, or one that does not fit the domain, by its number.
-    """
-    text, source = text_or_file, "--plan"
-    if "(" not in text_or_file:
-        source = text_or_file
-        try:
-            text = Path(text_or_file).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError, ValueError) as error:
-            raise FileFormatError(
-                f"cannot read plan {text_or_file}: {error}; give a file with one step a line, "
-                "or the steps: 'skill(Thing); skill(Thing, Place)'"
-            ) from error
-    lines = (line.partition("#")[0] for line in text.splitlines())
-    steps = [step.strip() for line in lines for step in re.split(";", line) if step.strip()]
-    if not steps:
-        raise InputError(f"{source}: the plan has no step")
-    plan = []
-    for number, step in enumerate(steps, 1):
-        try:
-            plan.append(_fitting(Subtask.parse(step), domain))
-        except InputError as error:
-            raise InputError(f"{source}: step {number}: {error}") from error
-    return Plan(tuple(plan))
-
-
-def _fitting(subtask: Subtask, domain: Domain) -> Subtask:
-    words = Words(domain)
-    for name in subtask.args:
-        if words.slip(name):
-            domain[name]
-    return domain.check(words.subtask(subtask))
 
 
 def _strategy(parts: Assembly, scenes: int) -> Strategy:

@@ -20,6 +20,7 @@ from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
 from forestall.cli.parts import parts
+from forestall.cli.plan import plan
 from forestall.cli.run import run
 from forestall.errors import InputError
 
@@ -37,6 +38,7 @@ app.command(bench)
 app.command(cases)
 experiments.register(bench)
 app.command(encoder)
+app.command(plan)
 
 
 def answer(arguments: Sequence[str]) -> int:
