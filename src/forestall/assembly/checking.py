@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
+from forestall.assembly.corrections import described, remembering
 from forestall.assembly.make import STORED_STATES, provenance
+from forestall.assembly.own_domain import domain_of_demonstrations
 from forestall.assembly.parts import Assembly
 from forestall.assembly.plans import fitting, read_plan
 from forestall.assembly.registry import known
@@ -36,7 +39,9 @@ from forestall.types.episode import (
     SkillOutcome,
     SkillStatus,
 )
+from forestall.types.facts import category_of, is_instance
 from forestall.types.plan import Plan, Subtask, same_step
+from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 
@@ -87,10 +92,14 @@ class Judgement:
 
 @dataclass(frozen=True, slots=True)
 class Judgements:
-    """Every scene's, and the record from which the page is drawn."""
+    """Every scene's, and the record from which the page is drawn.
+
+    `limits` say what cannot be judged because the domain was learnt from the demonstrations.
+    """
 
     each: tuple[Judgement, ...]
     record: EpisodeRecord
+    limits: tuple[str, ...] = ()
 
     @property
     def outcome(self) -> Outcome:
@@ -110,6 +119,9 @@ def judge_stored(
 ) -> Judgements:
     """Judge scenes in their order.
 
+    Where neither a domain nor a task was named, the domain is that of the demonstrations: one that
+    comes with the project and has their skills, else one that is learnt from them.
+
     Args:
         paths: observation folders (docs/observation-format.md), graph files, or folders that hold
             numbered ones.
@@ -126,7 +138,7 @@ def judge_stored(
     if not scenes:
         raise InputError("nothing to judge: give an observation folder or a graph file")
     config = _config(question, given or Given(), all(map(is_graph, scenes)))
-    task, domain = _task(question, config, demonstrations)
+    task, domain, limits = _task(question, config, demonstrations, memory)
     wanted = None
     if question.subtask is not None:
         wanted = fitting(Subtask.parse(question.subtask), domain)
@@ -136,20 +148,21 @@ def judge_stored(
             "each at most, or --subtask to judge all before the same one"
         )
     stated: dict[str, Mapping[str, str]] = {}
+    choices = remembering(config.choices, memory)
     if demonstrations is not None:
-        seeing = Assembly(config.choices, domain, None, {"states": stated}).part(PERCEIVER)
+        seeing = Assembly(choices, domain, None, {"states": stated}).part(PERCEIVER)
         demonstrations = scoped(demonstrations, seeing.scope)
-    parts = Assembly(config.choices, domain, demonstrations, {"states": stated})
+    parts = Assembly(choices, domain, demonstrations, {"states": stated})
     bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
     strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)
     monitor = Monitor(strategy, domain, perceiver, bounds)
     monitor.start(task)
     found: list[Judgement] = []
     passed: list[ExecutedRecord] = []
-    for stored in _read(scenes, domain, stated):
+    for stored in _read(scenes, domain, stated, learnt=bool(limits)):
         if found and wanted is None:
             passed.append(_passed(monitor, found[-1].record, stored))
-        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures))
+        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures, domain))
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -165,20 +178,21 @@ def judge_stored(
             *((name, value) for name, value in provenance(config) if name != "loop"),
             ("perception", dict(perceiver.describe())),
             ("memory", memory),
+            ("corrections", described(config.choices, memory)),
             ("observations", [str(path) for path in scenes]),
             ("inputs", {"task": repr(task), "domain": digest_of(domain)}),
         ),
     )
-    return Judgements(tuple(found), record)
+    return Judgements(tuple(found), record, limits)
 
 
 def _read(
-    scenes: Sequence[Path], domain: Domain, stated: dict[str, Mapping[str, str]]
+    scenes: Sequence[Path], domain: Domain, stated: dict[str, Mapping[str, str]], *, learnt: bool
 ) -> Iterator[Stored]:
     """Scene by scene, so that few pictures are held at once; `stated` is what the last one says."""
     names = Names(domain)
     for path in scenes:
-        stored = read_scene(path, domain, names)
+        stored = read_scene(path, domain, names, learnt)
         stated.clear()
         stated.update(stored.states)
         yield stored
@@ -199,15 +213,22 @@ def _config(question: Question, given: Given, graphs: bool) -> RunConfig:
 
 
 def _task(
-    question: Question, config: RunConfig, demonstrations: Sequence[Demonstration] | None
-) -> tuple[Task, Domain]:
-    """The task with the plan at hand, and its domain.
+    question: Question,
+    config: RunConfig,
+    demonstrations: Sequence[Demonstration] | None,
+    memory: str | None,
+) -> tuple[Task, Domain, tuple[str, ...]]:
+    """The task with the plan at hand, its domain, and what a learnt one cannot know.
 
     A plan of no task is of the one that all demonstrations are of, if there is one. A subtask that
     the task's own plan does not have is judged alone, without the task's goal.
     """
+    limits: tuple[str, ...] = ()
     if question.task is None:
         domain = config.load_domain()
+        if config.domain is None and demonstrations:
+            own = domain_of_demonstrations(demonstrations, memory)
+            domain, limits = own.domain, own.limits
         title = f"before {question.subtask}" if question.subtask else "a plan"
         shown = {d.task for d in demonstrations or ()}
         name = shown.pop() if question.plan is not None and len(shown) == 1 else ""
@@ -220,13 +241,13 @@ def _task(
     if question.subtask is None:
         if not len(task.plan):
             raise InputError("say before what: --subtask STEP, --plan 'STEP; STEP' or --task NAME")
-        return task, domain
+        return task, domain, limits
     wanted = fitting(Subtask.parse(question.subtask), domain)
     if not any(same_step(step, wanted) for step in task.plan):
         if question.plan is not None:
             raise UnknownNameError("step of the plan", str(wanted), task.plan.texts())
         task = replace(task, goal=Goal(""), plan=Plan((wanted,)))
-    return task, domain
+    return task, domain, limits
 
 
 def _strategy(parts: Assembly, scenes: int) -> Strategy:
@@ -258,7 +279,22 @@ def _asked(monitor: Monitor, stored: Stored, wanted: Subtask | None) -> MonitorD
     return decision if unlocated(decision.context) else monitor.before(stored.scene, wanted)
 
 
-def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgement:
+def _meant(context: BoundaryContext, domain: Domain) -> str:
+    """Things of the scene that may be meant by arguments that are in no view."""
+    ids, text = [n.id for n in context.graph.nodes], ""
+    for name in unlocated(context):
+        if domain.find(name) is None:
+            names = {*ids, *(n.category for n in context.graph.nodes)}
+            near = get_close_matches(name, sorted(names - {name}), 3)
+        elif is_instance(name):
+            near = [n for n in ids if n != name and category_of(n) == category_of(name)]
+        else:
+            continue
+        text += f"; did you mean {' or '.join(near)} by {name}?" if near else ""
+    return text
+
+
+def _judgement(path: Path, decision: MonitorDecision, pictures: bool, domain: Domain) -> Judgement:
     """What is kept of a decision; a plan that may not be adopted is one that is proposed."""
     record, replan, verdict = decision.record, decision.replan, decision.verdict
     assert record is not None, "what was looked at is recorded"
@@ -267,6 +303,8 @@ def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgeme
         decision = replace(decision, outcome=Outcome.REPLAN, hold=None, plan=replan.plan, why=why)
     if not decision.why and verdict is not None:
         decision = replace(decision, why=verdict.note)
+    if decision.outcome is Outcome.LOOK and decision.context is not None:
+        decision = replace(decision, why=decision.why + _meant(decision.context, domain))
     record = replace(record, outcome=decision.outcome)
     if not pictures:
         record = replace(record, observation=None)

@@ -13,6 +13,7 @@ from inspect import signature
 from typing import Annotated, Any, TypeVar
 
 from forestall.assembly.configuration import SWITCHES
+from forestall.assembly.corrections import corrections_of
 from forestall.assembly.seeing import look_encoder
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.comparison.preconditions import MiningConfig, mine, violations
@@ -137,9 +138,17 @@ def always_held(
     *,
     alarm: PreconditionConfig | None = None,
     mining: MiningConfig | None = None,
+    corrections: str | None = None,
 ) -> PreconditionDetector:
-    """What always held before the subtask in its demonstrations."""
-    return PreconditionDetector(parts.domain, mining, alarm)
+    """What always held before the subtask in its demonstrations.
+
+    Args:
+        parts: domain, demonstrations.
+        alarm: when.
+        mining: how much evidence.
+        corrections: file of corrections by hand; the one beside the memory, where there is one.
+    """
+    return PreconditionDetector(parts.domain, mining, alarm, corrections_of(parts, corrections))
 
 
 def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDetector:
@@ -147,9 +156,12 @@ def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDete
     return CaptionDetector(parts.part(CAPTIONER), parts.part(TEXT_ENCODER), alarm)
 
 
-def preconditions(parts: Parts, *, mining: MiningConfig | None = None) -> SymbolicReasoner:
-    """What always held before the subtask and does not now."""
-    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain)
+def preconditions(
+    parts: Parts, *, mining: MiningConfig | None = None, corrections: str | None = None
+) -> SymbolicReasoner:
+    """What always held before the subtask and does not now; options as `always_held`."""
+    layer = corrections_of(parts, corrections)
+    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain, layer)
 
 
 def no_reasoning(parts: Parts) -> NoReasoning:

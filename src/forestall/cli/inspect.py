@@ -105,7 +105,8 @@ def check(
         explain: a picture to write of what was understood: masks with their names, the scene from
             above; also of what is refused.
         memory: a demonstration file; the ready-made one of the task by default.
-        domain: what everything is read in: a name, or a file (.toml, .pddl); the task's by default.
+        domain: what everything is read in: a name, or a file (.toml, .pddl); by default the task's,
+            else one that has the skills of the memory, else one that is learnt from it.
         threshold: alarm when no demonstration reaches this score.
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
@@ -149,6 +150,12 @@ def check(
     found = judge_stored(scenes, question, demonstrations, given, path, page is not None)
     if page is not None:
         write_page(found.record, page)
+    if found.limits:
+        print(
+            f"forestall: the domain is learnt from {path}; what it cannot know: "
+            "'forestall domain learn'",
+            file=sys.stderr,
+        )
     if as_json:
         print(json.dumps(_judgements_json(found, path, page), indent=2))
     else:
@@ -170,6 +177,7 @@ def _judgements_json(found: Judgements, memory: str | None, page: Path | None) -
         "domain": record.task.domain,
         "plan": record.initial_plan.texts(),
         "memory": memory,
+        "limits": list(found.limits),
         "page": None if page is None else str(page),
         "scenes": [_judgement_json(j) for j in found.each],
     }

@@ -125,7 +125,7 @@ def _tell(found: CheckedPlan) -> None:
     from forestall.planning.rehearse import PlanOutcome
 
     rehearsal, check = found.rehearsal, found.rehearsal.check
-    rows = [(str(number), *row) for number, row in enumerate(_rows(found), 1)]
+    rows: list[tuple[str, ...]] = [(str(n), *row) for n, row in enumerate(_rows(found), 1)]
     print_table(("", "step", "means", "", "why"), rows)
     for spoilt in rehearsal.spoils:
         when = "as the robot leaves" if spoilt.step is None else f"by step {spoilt.step + 1}"
