@@ -150,6 +150,8 @@ def check(
     found = judge_stored(scenes, question, demonstrations, given, path, page is not None)
     if page is not None:
         write_page(found.record, page)
+    if path is not None:
+        _tell_stale(Path(path), domain)
     if found.limits:
         print(
             f"forestall: the domain is learnt from {path}; what it cannot know: "
@@ -161,6 +163,16 @@ def check(
     else:
         _tell(found, page)
     return _code(found)
+
+
+def _tell_stale(memory: Path, domain: str | None) -> None:
+    """Say which corrections beside a memory change nothing any more."""
+    from forestall.assembly.corrections import beside
+    from forestall.assembly.mined import remembered
+    from forestall.cli.preconditions import given_domain, tell_stale
+
+    if beside(memory).is_file():
+        tell_stale(remembered(memory, given_domain(domain)))
 
 
 def _code(found: Judgements) -> int:

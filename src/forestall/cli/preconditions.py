@@ -46,9 +46,9 @@ def list_(
     from forestall.assembly.mined import remembered, rows
     from forestall.cli.listing import print_table
 
-    known = remembered(memory, _given(domain))
+    known = remembered(memory, given_domain(domain))
     found = rows(known, task, skill)
-    _tell_stale(known)
+    tell_stale(known)
     if as_json:
         print(json.dumps({"domain": known.domain.name, "rows": _plain(found)}, indent=2))
         return 0
@@ -94,10 +94,10 @@ def show(
     from forestall.cli.listing import say
     from forestall.types.plan import Subtask
 
-    known = remembered(memory, _given(domain))
+    known = remembered(memory, given_domain(domain))
     wanted = fitting(Subtask.parse(subtask), known.domain)
     found = shown(known, wanted, task)
-    _tell_stale(known)
+    tell_stale(known)
     if as_json:
         print(json.dumps([_shown_json(s) for s in found], indent=2))
         return 0
@@ -139,9 +139,9 @@ def export(
     from forestall.domain.toml_out import domain_toml
     from forestall.files import replace_file
 
-    known = remembered(memory, _given(domain))
+    known = remembered(memory, given_domain(domain))
     found = rows(known, task, skill)
-    _tell_stale(known)
+    tell_stale(known)
     if to == "toml":
         replace_file(out, _toml(found, known).encode("utf-8"))
         print(f"{out}: {len(found)} preconditions of {len({r.skill for r in found})} skills")
@@ -189,7 +189,7 @@ def edit(
 
     if not (drop or add or undo):
         raise InputError("nothing to correct: give --drop, --add or --undo 'skill: fact'")
-    known = remembered(memory, _given(domain))
+    known = remembered(memory, given_domain(domain))
     if task and task not in known.tasks:
         raise UnknownNameError(f"task of {memory}", task, known.tasks)
 
@@ -200,17 +200,19 @@ def edit(
     new = [*read(drop, adds=False), *read(add, adds=True)]
     written = edited(memory, new, read(undo, adds=False), known.domain)
     say(f"{written.source}: {len(written.each)} corrections")
-    _tell_stale(remembered(memory, _given(domain)))
+    tell_stale(remembered(memory, given_domain(domain)))
     return 0
 
 
-def _given(domain: str | None) -> Given:
+def given_domain(domain: str | None) -> Given:
+    """What was said of the domain."""
     from forestall.assembly.configuration import Given
 
     return Given.named({"domain": domain})
 
 
-def _tell_stale(known: Remembered) -> None:
+def tell_stale(known: Remembered) -> None:
+    """Say on standard error which corrections change nothing any more."""
     from forestall.assembly.mined import stale_in
     from forestall.reading.printing import printable
 
