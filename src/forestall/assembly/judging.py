@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeVar
 
 from forestall.assembly.calibrated import calibrated
 from forestall.assembly.configuration import SWITCHES
+from forestall.assembly.corrections import corrections_of
 from forestall.assembly.seeing import look_encoder
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.comparison.preconditions import MiningConfig, mine, violations
@@ -149,18 +150,22 @@ def always_held(
     alarm: PreconditionConfig | None = None,
     mining: MiningConfig | None = None,
     calibration: Path | None = None,
+    corrections: str | None = None,
 ) -> PreconditionDetector:
     """What always held before the subtask in its demonstrations.
 
     Args:
-        parts: domain; of a calibration also retriever and demonstrations.
+        parts: domain, demonstrations; of a calibration also the retriever.
         alarm: the threshold.
         mining: how much evidence a precondition needs.
         calibration: a file of `forestall calibrate`, which says whether it may alarm.
+        corrections: file of corrections by hand; the one beside the memory, where there is one.
     """
     used = (alarm or PreconditionConfig(), mining or MiningConfig())
     thresholds = calibrated(parts, calibration, PreconditionDetector.name, *used)
-    return PreconditionDetector(parts.domain, mining, alarm, thresholds)
+    return PreconditionDetector(
+        parts.domain, mining, alarm, thresholds, corrections_of(parts, corrections)
+    )
 
 
 def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDetector:
@@ -168,9 +173,12 @@ def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDete
     return CaptionDetector(parts.part(CAPTIONER), parts.part(TEXT_ENCODER), alarm)
 
 
-def preconditions(parts: Parts, *, mining: MiningConfig | None = None) -> SymbolicReasoner:
-    """What always held before the subtask and does not now."""
-    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain)
+def preconditions(
+    parts: Parts, *, mining: MiningConfig | None = None, corrections: str | None = None
+) -> SymbolicReasoner:
+    """What always held before the subtask and does not now; options as `always_held`."""
+    layer = corrections_of(parts, corrections)
+    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain, layer)
 
 
 def no_reasoning(parts: Parts) -> NoReasoning:

@@ -21,6 +21,8 @@ from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
 from forestall.cli.parts import parts
+from forestall.cli.plan import plan
+from forestall.cli.preconditions import preconditions
 from forestall.cli.run import run
 from forestall.errors import InputError
 
@@ -38,6 +40,8 @@ app.command(bench)
 app.command(cases)
 experiments.register(bench)
 app.command(encoder)
+app.command(plan)
+app.command(preconditions)
 
 
 def answer(arguments: Sequence[str]) -> int:

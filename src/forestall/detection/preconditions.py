@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from forestall.calibration.fitted import JudgeThresholds
+from forestall.comparison.corrections import Corrections
 from forestall.comparison.preconditions import MiningConfig, mine, violations
 from forestall.comparison.relevance import counts
 from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
@@ -74,6 +75,7 @@ class PreconditionDetector:
         config: the threshold.
         thresholds: from a calibration, which has counted the alarms of good runs: as a judge that
             says yes or no it may alarm or it may not, whatever the weight.
+        corrections: what a person says of what is mined.
     """
 
     name = "preconditions"
@@ -84,11 +86,13 @@ class PreconditionDetector:
         mining: MiningConfig | None = None,
         config: PreconditionConfig | None = None,
         thresholds: JudgeThresholds | None = None,
+        corrections: Corrections | None = None,
     ) -> None:
         self._domain = domain
         self._mining = mining or MiningConfig()
         self._config = config or PreconditionConfig()
         self._thresholds = thresholds
+        self._corrections = corrections
         self._mined: dict[object, tuple[Precondition, ...]] = {}
 
     def judge(
@@ -156,7 +160,11 @@ class PreconditionDetector:
         if key not in self._mined:
             if len(self._mined) >= _KEPT:
                 self._mined.clear()
-            self._mined[key] = mine(references, self._domain, self._mining, subtask=subtask)
+            found = mine(references, self._domain, self._mining, subtask=subtask)
+            if self._corrections is not None:
+                task = references[0].task
+                found = self._corrections.over(found, subtask, task, self._domain)
+            self._mined[key] = found
         return self._mined[key]
 
     def _verdict(
@@ -181,15 +189,18 @@ class PreconditionDetector:
 
 
 def weight(violation: Violation) -> float:
-    """How much a precondition weighs by its evidence: the rule of succession."""
+    """How much a precondition weighs: the rule of succession; what a person says weighs 1."""
     p = violation.precondition
-    return (p.support + 1) / (p.total + 2)
+    return 1.0 if p.by_hand else (p.support + 1) / (p.total + 2)
 
 
 def _listed(what: str, found: Sequence[Violation]) -> str:
-    texts = [
-        f"{v.literal} (held in {v.precondition.support} of {v.precondition.total})"
-        for v in found[:_TOLD]
-    ]
+    texts = [f"{v.literal} ({_evidence(v.precondition)})" for v in found[:_TOLD]]
     more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return f"{what}: {', '.join(texts)}{more}"
+
+
+def _evidence(precondition: Precondition) -> str:
+    if precondition.by_hand:
+        return "a correction by hand"
+    return f"held in {precondition.support} of {precondition.total}"

@@ -104,7 +104,7 @@ class Precondition:
     """A lifted literal that held in the demonstrations before a skill.
 
     `literal` uses ?object and ?target (and category names for other things). `support` of `total`
-    demonstrations had it true; the others had it unobserved or false.
+    demonstrations had it true; the others had it unobserved or false. `by_hand`: a person says so.
     """
 
     skill: str
@@ -112,6 +112,7 @@ class Precondition:
     support: int
     total: int
     weight: float = 1.0
+    by_hand: bool = False
 
 
 @dataclass(frozen=True, slots=True)

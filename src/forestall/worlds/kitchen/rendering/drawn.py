@@ -70,7 +70,7 @@ class Drawn:
 
     @property
     def nbytes(self) -> int:
-        """Of the memory that is held for it: an array that shows a part of another holds all of it."""
+        """Of the memory that is held for it: an array that shows a part of another holds it all."""
         frame, basis, content = self.frame, self.basis, self.content
         arrays: list[npt.NDArray[Any] | None] = [frame.rgb, frame.depth_m, frame.instance_ids]
         if basis is not None:
