@@ -189,7 +189,7 @@ class Parts(Protocol):
         """Every name of a kind; or every option of one part of it."""
 
     def lent(self, what: str) -> Any:
-        """Something of this very run: "truth", "states"; InputError where there is none."""
+        """Something of this very run: "truth", "states", "task"; InputError where there is none."""
 
 
 class World(Protocol):

@@ -79,8 +79,9 @@ def test_its_demonstrations_are_recorded_in_it_and_keyed_by_its_content(blowing:
 def test_the_key_is_the_same_in_every_process(tmp_path: Path) -> None:
     code = (
         "import forestall.assembly.demonstrations as d, sys;"
+        "from forestall.assembly.configuration import run_config;"
         "d.record_into = lambda *a: sys.exit(0);"
-        "d.ready_made(d.run_config('fasten-plate'), announce=print)"
+        "d.ready_made(run_config('fasten-plate'), announce=print)"
     )
     told = {
         subprocess.run(

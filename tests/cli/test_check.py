@@ -13,6 +13,7 @@ from forestall.assembly.checking import Question, judge_stored
 from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.make import prepare, run_episode
 from forestall.assembly.recording import RecordingJob, record_one
+from forestall.assembly.sources import demonstrations_from
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.load import shipped
@@ -26,6 +27,8 @@ from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
 from perception.synthetic import Solid, at, looking, observed
+from stranger import INSERT, TWELVE
+from stranger import scene as pegs
 
 POSE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
 COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
@@ -275,6 +278,68 @@ def test_the_plan_alone_may_be_checked_without_any_demonstration(
     assert "full of chips" in told["scenes"][0]["cause"]
     assert call(["check", str(graph), *asked]) == 2
     assert "give --memory FILE" in capsys.readouterr().err
+
+
+def test_without_a_domain_it_is_that_of_the_memory(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (graph,) = (bench / "graphs").glob("03-*.json")
+    asked = ["--subtask", "insert(Bolt, BoltHole)", "--memory", str(bench / "bench.db")]
+    code, told = checked(capsys, [graph], *asked)
+    assert (code, told["domain"], told["limits"]) == (1, "bench", [])
+    memory = tmp_path / "pegs.db"
+    with open_store(memory, create=True) as store:
+        for d in demonstrations_from(TWELVE):
+            store.add(d)
+    scenes = {"fine": pegs("hand"), "dirty": pegs("hand", hole="dirty"), "free": pegs()}
+    for name, data in scenes.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps(data))
+    asked = ["--subtask", INSERT, "--memory", str(memory), "--detector.name", "preconditions"]
+    found = {n: checked(capsys, [tmp_path / f"{n}.json"], *asked) for n in scenes}
+    assert [code for code, _ in found.values()] == [0, 1, 1]
+    assert found["fine"][1]["domain"] == "learnt" and found["fine"][1]["limits"]
+    assert found["free"][1]["scenes"][0]["replan"]["plan"] == ["grasp(peg-1)", INSERT]
+    for meant in ("peg-1", "hole-1"):
+        slip = INSERT.replace(meant, {"peg-1": "pge-1", "hole-1": "hole-9"}[meant])
+        code, told = checked(capsys, [tmp_path / "fine.json"], *asked[2:], "--subtask", slip)
+        assert code == 4 and f"did you mean {meant} by" in told["scenes"][0]["why"]
+
+
+def test_a_missing_memory_of_a_task_says_how_to_record_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.json").write_text(json.dumps(pegs()))
+    asked = ["check", "scene.json", "--subtask", INSERT, "--memory", "absent.db"]
+    assert call(asked) == 3
+    err = capsys.readouterr().err
+    assert "make one with 'forestall demos add'" in err and "record" not in err
+    assert call([*asked, "--task", "fasten-plate"]) == 3
+    assert "'forestall demos record absent.db --task fasten-plate'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("objects", "says"),
+    [
+        ({"Mug-1": "held_by gripper"}, 'write ["Mug-1", "held_by", "gripper"] among the relations'),
+        ({"Mug-1": "on top of Plate-1"}, 'write ["Mug-1", "on_top_of", "Plate-1"] among the'),
+        ({"Mug-1": "dirty=clean"}, "stands in the place of its category and is a state"),
+        ({"Mug-1": {"held_by": "gripper"}}, 'write ["Mug-1", "held_by", "gripper"] among the'),
+        ({"Mug-1": "clean"}, 'which is a state: write "Mug-1": {"dirty": "clean"}'),
+        ({"Mug-1": "inside"}, "of the category 'inside', which is a relation: write"),
+    ],
+)
+def test_a_state_or_a_relation_does_not_become_a_category(
+    memory: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    objects: dict[str, object],
+    says: str,
+) -> None:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps({"objects": {"Plate-1": {}, **objects}}))
+    assert call(["check", str(path), "--subtask", STEP, "--memory", str(memory)]) == 2
+    assert says in capsys.readouterr().err
 
 
 # --- what was understood ------------------------------------------------------------------------

@@ -61,6 +61,53 @@ def test_a_label_that_says_nothing_is_refused(
     assert not memory.exists()
 
 
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        (["--subtask", "inser(peg-1, hole-1, driver-1)"], "unknown skill 'inser': did you mean in"),
+        (["--subtask", "insert(pge-1, hole-1, driver-1)"], "unknown thing 'pge-1': did you mean"),
+        (["--subtask", "insert(peg-1, hole-1)"], "insert has 3 argument(s), not 2"),
+        (["--fact", "surfce(hole-1)=clean"], "unknown attribute 'surfce': did you mean surface"),
+        (["--fact", "surface(hole-1)=claen"], "unknown value of surface 'claen': did you mean cle"),
+        (["--fact", "surface(hoel-1)=clean"], "unknown thing 'hoel-1': did you mean hole"),
+        (["--fact", "hold_by(peg-1, gripper)"], "unknown relation 'hold_by': did you mean held_by"),
+        (["--fact", "held_by(peg-1)=gripper"], "is a relation: write held_by(peg-1, gripper)"),
+        (["--fact", "surface(hole-1)"], "says no value: write surface(hole-1)=clean"),
+        (["--fact", "clean(hole-1)"], "did you mean surface(hole-1)=clean?"),
+        (["--fact", "shiny(hole-1)"], "neither a state nor a relation: write attribute(thing)="),
+        (["--fact", "surface(hole-1, peg-1)=clean"], "gives a state to 2 things"),
+    ],
+)
+def test_a_slip_of_the_pen_in_a_label_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], said: list[str], told: str
+) -> None:
+    memory = tmp_path / "memory.db"
+    with open_store(memory, create=True) as store:
+        for d in demonstrations_from(TWELVE[:2]):
+            store.add(d)
+    subtask = [] if "--subtask" in said else ["--subtask", INSERT]
+    fact = [] if "--fact" in said else ["--fact", "surface(hole-1)=clean"]
+    assert call(["demos", "label", str(memory), *subtask, *fact, *said]) == 2
+    err = capsys.readouterr().err
+    assert told in err and len(err.splitlines()) == 1
+    with open_store(memory) as store:
+        assert len(store) == 2
+
+
+def test_new_words_in_a_label_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    memory = tmp_path / "memory.db"
+    said = ["demos", "label", str(memory), "--subtask", INSERT, "--fact", "surface(hole-1)=clean"]
+    assert call(said) == 0
+    again = ["demos", "label", str(memory), "--subtask", INSERT]
+    assert call([*again, "--fact", "colour(bolt-7)=red"]) == 0
+    assert call([*again, "--fact", "surfaces(hole-1)=clean"]) == 2
+    assert "say --new where it is another word" in capsys.readouterr().err
+    assert call([*again, "--fact", "surfaces(hole-1)=clean", "--new"]) == 0
+    own = ["demos", "label", str(tmp_path / "own.db"), "--domain", "bench", "--subtask"]
+    assert call([*own, "pick(Nut-1)", "--fact", "torqe(Nut-1)=tight"]) == 2
+    assert "did you mean torque" in capsys.readouterr().err
+
+
 def test_a_draft_of_a_domain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     memory, draft = tmp_path / "memory.db", tmp_path / "pegs.toml"
     with open_store(memory, create=True) as store:

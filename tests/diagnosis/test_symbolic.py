@@ -6,13 +6,13 @@ from dataclasses import replace
 import pytest
 
 from forestall.comparison.preconditions import mine, violations
-from forestall.diagnosis.symbolic import SymbolicReasoner
+from forestall.diagnosis.symbolic import SymbolicReasoner, explain
 from forestall.domain.model import Domain
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.validate import GraphValidator, observed, unmet
 from forestall.replanning.symbolic import PlannerReplanner
-from forestall.types.facts import Literal, Truth
-from forestall.types.graph import SceneGraph
+from forestall.types.facts import Literal, Truth, category_of
+from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import When
 from forestall.types.verdict import (
@@ -206,6 +206,19 @@ def scripted(lifted: str, ground_fact: str, support: int = 4) -> Diagnosis:
 )
 def test_causes_are_readable(lifted: str, fact: str, cause: str) -> None:
     assert cause in scripted(lifted, fact).cause
+
+
+def test_things_that_are_taken_to_hold_each_other_end_in_a_cause() -> None:
+    tied = (
+        Relation("Egg-1", "inside", "Bowl-1"),
+        Relation("Bowl-1", "inside", "Egg-1"),
+    )
+    nodes = tuple(ObjectNode(n, category_of(n)) for n in ("Egg-1", "Bowl-1", "Fridge-1"))
+    literal = Literal.parse("accessible(Egg-1)")
+    rule = Precondition("pick_up", Literal.parse("accessible(?object)"), 4, 4)
+    violation = Violation(rule, literal, Truth.FALSE)
+    told = explain(violation, SceneGraph(nodes, tied), Subtask.parse("pick_up(Egg)"), DOMAIN)
+    assert told.startswith("Egg-1 is inside")
 
 
 def test_support_is_told() -> None:

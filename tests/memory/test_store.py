@@ -202,7 +202,7 @@ def test_no_folder_no_file_empty_file(tmp_path: Path) -> None:
 def test_no_demonstrations_where_they_are_needed(path: Path) -> None:
     with open_store(path, create=True) as store:
         assert store.all() == []
-        with pytest.raises(MemoryFileError, match="holds no demonstrations: record some"):
+        with pytest.raises(MemoryFileError, match="holds no demonstrations: add some"):
             store.required()
 
 

@@ -12,6 +12,7 @@ from forestall.domain.truth import truth
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
+from forestall.perception.support import circular
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import Relation, SceneGraph
 
@@ -273,3 +274,23 @@ def test_what_a_wide_mask_shows_far_behind_is_no_part_of_the_thing() -> None:
     node = perceiver.perceive(wide).get("Mug-1")
     assert node is not None and node.box_m is not None
     assert max(node.box_m.size) < 0.13
+
+
+def test_nothing_holds_what_holds_it() -> None:
+    links = {
+        "Bowl-1": ("on_top_of", "Plate-1"),
+        "Plate-1": ("on_top_of", "Bowl-1"),
+        "Egg-1": ("inside", "Bowl-1"),
+        "Pot-1": ("on_top_of", "CounterTop-1"),
+    }
+    assert circular(links, {"Bowl-1", "Egg-1"}) == ["Plate-1"], "what is only remembered goes"
+    assert circular(links, {"Plate-1"}) == ["Bowl-1"]
+    assert circular(links, links) == ["Plate-1"]
+    assert circular({k: v for k, v in links.items() if k != "Plate-1"}, ()) == []
+    longer = {
+        "A-1": ("on", "B-1"),
+        "B-1": ("on", "C-1"),
+        "C-1": ("on", "A-1"),
+        "D-1": ("on", "A-1"),
+    }
+    assert circular(longer, {"A-1", "C-1"}) == ["B-1"]

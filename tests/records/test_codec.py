@@ -295,6 +295,7 @@ VERDICTS = st.builds(
     ).map(tuple),
     st.integers(0, 99),
     WORDS,
+    p_value=st.none() | NUMBERS,
 )
 CHECKS = st.builds(
     PlanCheck, st.booleans(), st.none() | st.integers(0, 9), WORDS, FACTS, FACTS, FACTS

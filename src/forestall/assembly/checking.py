@@ -7,22 +7,25 @@ followed. Composition like `make`, for `forestall check`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
+from forestall.assembly.corrections import described, remembering
 from forestall.assembly.make import STORED_STATES, provenance
+from forestall.assembly.own_domain import domain_of_demonstrations
 from forestall.assembly.parts import Assembly
+from forestall.assembly.plans import fitting, read_plan
 from forestall.assembly.registry import known
 from forestall.assembly.sources import scoped
 from forestall.assembly.stored import Stored, is_graph, read_scene, scenes_in
 from forestall.conclusion import MonitorConfig, unlocated
 from forestall.domain.model import Domain
-from forestall.domain.words import Names, Words
-from forestall.errors import FileFormatError, InputError, UnknownNameError
+from forestall.domain.words import Names
+from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import PERCEIVER, STATES, STRATEGY
 from forestall.monitor import Monitor
 from forestall.seams import Strategy
@@ -36,7 +39,9 @@ from forestall.types.episode import (
     SkillOutcome,
     SkillStatus,
 )
+from forestall.types.facts import category_of, is_instance
 from forestall.types.plan import Plan, Subtask, same_step
+from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 
@@ -56,7 +61,7 @@ class Question:
 
     Args:
         subtask: in text form: the same one for every scene. None: the plan's, one after the other.
-        plan: "step; step", or the path of a file with one step a line; the task's by default.
+        plan: "step; step", or a file (`assembly.plans`); the task's by default.
         task: name or file; its own demonstrations are preferred, and its goal is kept.
     """
 
@@ -87,10 +92,14 @@ class Judgement:
 
 @dataclass(frozen=True, slots=True)
 class Judgements:
-    """Every scene's, and the record from which the page is drawn."""
+    """Every scene's, and the record from which the page is drawn.
+
+    `limits` say what cannot be judged because the domain was learnt from the demonstrations.
+    """
 
     each: tuple[Judgement, ...]
     record: EpisodeRecord
+    limits: tuple[str, ...] = ()
 
     @property
     def outcome(self) -> Outcome:
@@ -110,6 +119,9 @@ def judge_stored(
 ) -> Judgements:
     """Judge scenes in their order.
 
+    Where neither a domain nor a task was named, the domain is that of the demonstrations: one that
+    comes with the project and has their skills, else one that is learnt from them.
+
     Args:
         paths: observation folders (docs/observation-format.md), graph files, or folders that hold
             numbered ones.
@@ -126,30 +138,32 @@ def judge_stored(
     if not scenes:
         raise InputError("nothing to judge: give an observation folder or a graph file")
     config = _config(question, given or Given(), all(map(is_graph, scenes)))
-    task, domain = _task(question, config, demonstrations)
+    task, domain, limits = _task(question, config, demonstrations, memory)
     wanted = None
     if question.subtask is not None:
-        wanted = _fitting(Subtask.parse(question.subtask), domain)
+        wanted = fitting(Subtask.parse(question.subtask), domain)
     if wanted is None and len(scenes) > len(task.plan):
         raise InputError(
             f"{len(scenes)} scenes for the {len(task.plan)} subtasks of the plan: give one for "
             "each at most, or --subtask to judge all before the same one"
         )
     stated: dict[str, Mapping[str, str]] = {}
+    choices = remembering(config.choices, memory)
     if demonstrations is not None:
-        seeing = Assembly(config.choices, domain, None, {"states": stated}).part(PERCEIVER)
+        seeing = Assembly(choices, domain, None, {"states": stated}).part(PERCEIVER)
         demonstrations = scoped(demonstrations, seeing.scope)
-    parts = Assembly(config.choices, domain, demonstrations, {"states": stated})
+    lent = {"states": stated, "task": task.name}
+    parts = Assembly(choices, domain, demonstrations, lent)
     bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
     strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)
     monitor = Monitor(strategy, domain, perceiver, bounds)
     monitor.start(task)
     found: list[Judgement] = []
     passed: list[ExecutedRecord] = []
-    for stored in _read(scenes, domain, stated):
+    for stored in _read(scenes, domain, stated, learnt=bool(limits)):
         if found and wanted is None:
             passed.append(_passed(monitor, found[-1].record, stored))
-        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures))
+        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures, domain))
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -165,20 +179,21 @@ def judge_stored(
             *((name, value) for name, value in provenance(config) if name != "loop"),
             ("perception", dict(perceiver.describe())),
             ("memory", memory),
+            ("corrections", described(config.choices, memory)),
             ("observations", [str(path) for path in scenes]),
             ("inputs", {"task": repr(task), "domain": digest_of(domain)}),
         ),
     )
-    return Judgements(tuple(found), record)
+    return Judgements(tuple(found), record, limits)
 
 
 def _read(
-    scenes: Sequence[Path], domain: Domain, stated: dict[str, Mapping[str, str]]
+    scenes: Sequence[Path], domain: Domain, stated: dict[str, Mapping[str, str]], *, learnt: bool
 ) -> Iterator[Stored]:
     """Scene by scene, so that few pictures are held at once; `stated` is what the last one says."""
     names = Names(domain)
     for path in scenes:
-        stored = read_scene(path, domain, names)
+        stored = read_scene(path, domain, names, learnt)
         stated.clear()
         stated.update(stored.states)
         yield stored
@@ -199,15 +214,22 @@ def _config(question: Question, given: Given, graphs: bool) -> RunConfig:
 
 
 def _task(
-    question: Question, config: RunConfig, demonstrations: Sequence[Demonstration] | None
-) -> tuple[Task, Domain]:
-    """The task with the plan at hand, and its domain.
+    question: Question,
+    config: RunConfig,
+    demonstrations: Sequence[Demonstration] | None,
+    memory: str | None,
+) -> tuple[Task, Domain, tuple[str, ...]]:
+    """The task with the plan at hand, its domain, and what a learnt one cannot know.
 
     A plan of no task is of the one that all demonstrations are of, if there is one. A subtask that
     the task's own plan does not have is judged alone, without the task's goal.
     """
+    limits: tuple[str, ...] = ()
     if question.task is None:
         domain = config.load_domain()
+        if config.domain is None and demonstrations:
+            own = domain_of_demonstrations(demonstrations, memory)
+            domain, limits = own.domain, own.limits
         title = f"before {question.subtask}" if question.subtask else "a plan"
         shown = {d.task for d in demonstrations or ()}
         name = shown.pop() if question.plan is not None and len(shown) == 1 else ""
@@ -220,51 +242,13 @@ def _task(
     if question.subtask is None:
         if not len(task.plan):
             raise InputError("say before what: --subtask STEP, --plan 'STEP; STEP' or --task NAME")
-        return task, domain
-    wanted = _fitting(Subtask.parse(question.subtask), domain)
+        return task, domain, limits
+    wanted = fitting(Subtask.parse(question.subtask), domain)
     if not any(same_step(step, wanted) for step in task.plan):
         if question.plan is not None:
             raise UnknownNameError("step of the plan", str(wanted), task.plan.texts())
         task = replace(task, goal=Goal(""), plan=Plan((wanted,)))
-    return task, domain
-
-
-def read_plan(text_or_file: str, domain: Domain) -> Plan:
-    """A plan of "step; step", or of a file with one step a line; "#" begins a comment.
-
-    Raises:
-        FileFormatError: the file cannot be read.
-        InputError: no step, or one that does not fit the domain, by its number.
-    """
-    text, source = text_or_file, "--plan"
-    if "(" not in text_or_file:
-        source = text_or_file
-        try:
-            text = Path(text_or_file).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError, ValueError) as error:
-            raise FileFormatError(
-                f"cannot read plan {text_or_file}: {error}; give a file with one step a line, "
-                "or the steps: 'skill(Thing); skill(Thing, Place)'"
-            ) from error
-    lines = (line.partition("#")[0] for line in text.splitlines())
-    steps = [step.strip() for line in lines for step in re.split(";", line) if step.strip()]
-    if not steps:
-        raise InputError(f"{source}: the plan has no step")
-    plan = []
-    for number, step in enumerate(steps, 1):
-        try:
-            plan.append(_fitting(Subtask.parse(step), domain))
-        except InputError as error:
-            raise InputError(f"{source}: step {number}: {error}") from error
-    return Plan(tuple(plan))
-
-
-def _fitting(subtask: Subtask, domain: Domain) -> Subtask:
-    words = Words(domain)
-    for name in subtask.args:
-        if words.slip(name):
-            domain[name]
-    return domain.check(words.subtask(subtask))
+    return task, domain, limits
 
 
 def _strategy(parts: Assembly, scenes: int) -> Strategy:
@@ -296,7 +280,22 @@ def _asked(monitor: Monitor, stored: Stored, wanted: Subtask | None) -> MonitorD
     return decision if unlocated(decision.context) else monitor.before(stored.scene, wanted)
 
 
-def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgement:
+def _meant(context: BoundaryContext, domain: Domain) -> str:
+    """Things of the scene that may be meant by arguments that are in no view."""
+    ids, text = [n.id for n in context.graph.nodes], ""
+    for name in unlocated(context):
+        if domain.find(name) is None:
+            names = {*ids, *(n.category for n in context.graph.nodes)}
+            near = get_close_matches(name, sorted(names - {name}), 3)
+        elif is_instance(name):
+            near = [n for n in ids if n != name and category_of(n) == category_of(name)]
+        else:
+            continue
+        text += f"; did you mean {' or '.join(near)} by {name}?" if near else ""
+    return text
+
+
+def _judgement(path: Path, decision: MonitorDecision, pictures: bool, domain: Domain) -> Judgement:
     """What is kept of a decision; a plan that may not be adopted is one that is proposed."""
     record, replan, verdict = decision.record, decision.replan, decision.verdict
     assert record is not None, "what was looked at is recorded"
@@ -305,6 +304,8 @@ def _judgement(path: Path, decision: MonitorDecision, pictures: bool) -> Judgeme
         decision = replace(decision, outcome=Outcome.REPLAN, hold=None, plan=replan.plan, why=why)
     if not decision.why and verdict is not None:
         decision = replace(decision, why=verdict.note)
+    if decision.outcome is Outcome.LOOK and decision.context is not None:
+        decision = replace(decision, why=decision.why + _meant(decision.context, domain))
     record = replace(record, outcome=decision.outcome)
     if not pictures:
         record = replace(record, observation=None)

@@ -10,9 +10,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from inspect import signature
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+from forestall.assembly.calibrated import calibrated
 from forestall.assembly.configuration import SWITCHES
+from forestall.assembly.corrections import corrections_of
 from forestall.assembly.seeing import look_encoder
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.comparison.preconditions import MiningConfig, mine, violations
@@ -105,10 +108,17 @@ def scene_graph(
     *,
     alarm: DetectorConfig | None = None,
     score: Annotated[ScoreConfig | None, Settled("feature")] = None,
+    calibration: Path | None = None,
 ) -> SceneGraphDetector:
     """The paper's score; without a part of it, its name says so.
 
     What a node's feature encodes is the perceiver's affair, who makes it.
+
+    Args:
+        parts: text encoder, perceiver; of a calibration also retriever and demonstrations.
+        alarm: the threshold.
+        score: what is compared, and how.
+        calibration: a file of `forestall calibrate`, whose thresholds stand for the fixed one.
     """
     options = score or ScoreConfig()
     feature = parts.options(PERCEIVER).get("feature")
@@ -119,7 +129,9 @@ def scene_graph(
     if left_out:
         name = f"{name} without {' and '.join(p.replace('-', ' ') for p in left_out)}"
     scorer = BatchScorer(options, parts.part(TEXT_ENCODER), parts.domain)
-    return SceneGraphDetector(scorer, alarm, name=name)
+    used = (alarm or DetectorConfig(), options)
+    thresholds = calibrated(parts, calibration, SceneGraphDetector.name, *used)
+    return SceneGraphDetector(scorer, alarm, name, thresholds)
 
 
 def objects(parts: Parts, *, alarm: DetectorConfig | None = None) -> ObjectCountDetector:
@@ -137,9 +149,23 @@ def always_held(
     *,
     alarm: PreconditionConfig | None = None,
     mining: MiningConfig | None = None,
+    calibration: Path | None = None,
+    corrections: str | None = None,
 ) -> PreconditionDetector:
-    """What always held before the subtask in its demonstrations."""
-    return PreconditionDetector(parts.domain, mining, alarm)
+    """What always held before the subtask in its demonstrations.
+
+    Args:
+        parts: domain, demonstrations; of a calibration also the retriever.
+        alarm: the threshold.
+        mining: how much evidence a precondition needs.
+        calibration: a file of `forestall calibrate`, which says whether it may alarm.
+        corrections: file of corrections by hand; the one beside the memory, where there is one.
+    """
+    used = (alarm or PreconditionConfig(), mining or MiningConfig())
+    thresholds = calibrated(parts, calibration, PreconditionDetector.name, *used)
+    return PreconditionDetector(
+        parts.domain, mining, alarm, thresholds, corrections_of(parts, corrections)
+    )
 
 
 def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDetector:
@@ -147,9 +173,12 @@ def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDete
     return CaptionDetector(parts.part(CAPTIONER), parts.part(TEXT_ENCODER), alarm)
 
 
-def preconditions(parts: Parts, *, mining: MiningConfig | None = None) -> SymbolicReasoner:
-    """What always held before the subtask and does not now."""
-    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain)
+def preconditions(
+    parts: Parts, *, mining: MiningConfig | None = None, corrections: str | None = None
+) -> SymbolicReasoner:
+    """What always held before the subtask and does not now; options as `always_held`."""
+    layer = corrections_of(parts, corrections)
+    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain, layer)
 
 
 def no_reasoning(parts: Parts) -> NoReasoning:
@@ -252,13 +281,13 @@ def watch(
         looks_each: see `strategies.watch`.
     """
     paper = SceneGraphDetector.name
-    primary = parts.part(DETECTOR, paper, **_shared(parts, paper))
+    primary = parts.part(DETECTOR, paper, **_shared(parts, paper, calibrated=True))
     ablated = [
         parts.part(DETECTOR, paper, **_shared(parts, paper), **{switch: False})
         for switch in SWITCHES.values()
     ]
     others: list[Detector] = [
-        parts.part(DETECTOR, name, **_shared(parts, name))
+        parts.part(DETECTOR, name, **_shared(parts, name, calibrated=True))
         for name in parts.declared(DETECTOR)
         if name != paper
     ]
@@ -315,11 +344,16 @@ def _with_few(parts: Parts, count: int) -> list[DetectorJudge]:
     ]
 
 
-def _shared(parts: Parts, name: str) -> dict[str, Any]:
-    """Options given to the run's detector that another has, too, the ablations apart."""
+def _shared(parts: Parts, name: str, calibrated: bool = False) -> dict[str, Any]:
+    """Options given to the run's detector that another has, too, the ablations apart.
+
+    A calibration is of one detector with all that it compares with: only the run's own may have it.
+    """
     known = parts.declared(DETECTOR, name)
+    keeps = calibrated and parts.name(DETECTOR) == name
+    own = (*SWITCHES.values(), *(() if keeps else ("calibration",)))
     return {
         option: value
         for option, value in parts.given(DETECTOR).items()
-        if option in known and option not in SWITCHES.values()
+        if option in known and option not in own
     }

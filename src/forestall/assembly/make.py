@@ -16,6 +16,7 @@ from typing import Any
 
 import forestall
 from forestall.assembly.configuration import RunConfig, digest_of
+from forestall.assembly.corrections import described, remembering
 from forestall.assembly.options import built
 from forestall.assembly.parts import Assembly
 from forestall.assembly.registry import find, known
@@ -151,7 +152,7 @@ def run_episode(
             meanings = environment if isinstance(environment, WorldsEdge) else None
             trace.attach(opened.oracle, loaded.domain, meanings)
             listeners = (*listeners, trace)
-        runtime = make_runtime(prepared, opened, environment, demonstrations, listeners)
+        runtime = make_runtime(prepared, opened, environment, demonstrations, listeners, memory)
         return runtime.run(
             loaded.task,
             prepared.plan,
@@ -161,6 +162,7 @@ def run_episode(
             (
                 *provenance(prepared.config),
                 ("memory", memory),
+                ("corrections", described(prepared.config.choices, memory)),
                 ("demonstrations", [{"id": d.id, "seed": d.seed} for d in demonstrations or ()]),
                 (
                     "inputs",
@@ -190,11 +192,13 @@ def make_runtime(
     environment: Environment,
     demonstrations: Sequence[Demonstration] | None,
     listeners: Sequence[Listener],
+    memory: str | None = None,
 ) -> Runtime:
     """The loop around an open world."""
     config, domain = prepared.config, prepared.loaded.domain
     known = prepared.model or domain
-    parts = Assembly(config.choices, known, demonstrations, {"truth": world.oracle})
+    lent = {"truth": world.oracle, "task": prepared.loaded.task.name}
+    parts = Assembly(remembering(config.choices, memory), known, demonstrations, lent)
     return Runtime(
         environment,
         parts.part(PERCEIVER),

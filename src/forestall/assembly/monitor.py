@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Choice, Given, choices, domain_of
+from forestall.assembly.corrections import remembering
 from forestall.assembly.eyes import eyes_for, is_picture
+from forestall.assembly.own_domain import corrected
 from forestall.assembly.parts import Assembly
-from forestall.assembly.sources import Source, demonstrations_from, scoped
+from forestall.assembly.sources import MEMORY_SUFFIXES, Source, demonstrations_from, scoped
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
 from forestall.domain.words import Words
@@ -70,7 +72,8 @@ class Monitor(RunMonitor):
 
         Args:
             source: a memory file, folders of runs, graphs, lists of (subtask, scene), or a mixture;
-                see `assembly.sources`. With a domain scenes may be pictures.
+                see `assembly.sources`. With a domain scenes may be pictures. Corrections by hand
+                beside a memory file count (docs/preconditions.md).
             domain: a domain, its name, or a file of one. Without it skills, relations and
                 attributes are those that the demonstrations use, what always held before a skill
                 is needed, what always changed is what it does; `limits` says what that leaves out.
@@ -88,10 +91,12 @@ class Monitor(RunMonitor):
         given: Given = options.pop("given", Given())
         said = Given.named(options).over(given).over(DEFAULTS)
         limits: tuple[str, ...] = ()
+        one = isinstance(source, str | Path) and str(source).endswith(MEMORY_SUFFIXES)
+        memory = str(source) if one else None
         if domain is None:
             demonstrations = demonstrations_from(source)
             learnt = learn(demonstrations, hands=hands)
-            own, limits = learnt.domain, learnt.limits
+            own, limits = corrected(learnt.domain, memory), learnt.limits
         else:
             own = _domain(domain)
             eyes = eyes_for(said, own)
@@ -99,6 +104,7 @@ class Monitor(RunMonitor):
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
+        chosen = remembering(chosen, memory)
         parts = Assembly(chosen, own, demonstrations, {"states": {}})
         monitor = cls(
             parts.part(STRATEGY),

@@ -148,7 +148,7 @@ def labelled(
     """
     given: dict[str, Any] = {"objects": {}, "relations": []}
     for fact in map(Literal.parse, facts):
-        if fact.value == "false" or len(fact.args) not in (1, _PAIR):
+        if fact.value == "false" or len(fact.args) != (1 if fact.is_state else _PAIR):
             raise InputError(
                 f"the fact '{fact}' cannot be drawn: write states, attribute(thing-1)=value, and "
                 "relations that hold, relation(thing-1, thing-2)"
@@ -157,7 +157,7 @@ def labelled(
             given["objects"].setdefault(name, {})
         if fact.is_state:
             given["objects"][fact.args[0]][fact.predicate] = fact.value
-        elif len(fact.args) == _PAIR:
+        else:
             given["relations"].append((fact.args[0], fact.predicate, fact.args[1]))
     graph = scene_graph(given)
     if scene is not None:

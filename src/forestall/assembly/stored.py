@@ -16,7 +16,8 @@ from forestall.domain.words import Names
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.folder import OBSERVATION_FILE, read_observation
 from forestall.reading.documents import read_json
-from forestall.types.graph import SceneGraph
+from forestall.types.facts import category_of
+from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.symbolic import scene_graph
 
@@ -65,8 +66,12 @@ def is_graph(path: Path) -> bool:
     return path.suffix == GRAPH_SUFFIX and not path.is_dir()
 
 
-def read_scene(path: Path, domain: Domain, names: Names | None = None) -> Stored:
+def read_scene(
+    path: Path, domain: Domain, names: Names | None = None, learnt: bool = False
+) -> Stored:
     """Read one scene; `names` are those of the scenes before it.
+
+    A `learnt` domain has only the words that its demonstrations used: a graph may have others.
 
     Raises:
         FileFormatError: a file is missing, cannot be read as what it should be, or says of things
@@ -78,7 +83,7 @@ def read_scene(path: Path, domain: Domain, names: Names | None = None) -> Stored
         return Stored(path, *read_observation(path, domain, names=names))
     graph = read_graph(path)
     try:
-        _check(graph, domain)
+        _check(graph, domain, learnt)
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
     return Stored(path, graph)
@@ -121,16 +126,17 @@ def _may_be_scene(path: Path) -> bool:
     return (path / OBSERVATION_FILE).is_file() if path.is_dir() else is_graph(path)
 
 
-def _check(graph: SceneGraph, domain: Domain) -> None:
+def _check(graph: SceneGraph, domain: Domain, learnt: bool) -> None:
     """A category may be any; what is said of things must mean something in the domain."""
     within: TopologicalSorter[str] = TopologicalSorter()
     for relation in graph.relations:
-        if relation.predicate not in domain.relations:
+        if relation.predicate not in domain.relations and not learnt:
             raise UnknownNameError("relation", relation.predicate, domain.relations)
         if relation.predicate in domain.containing:
             within.add(relation.subject, relation.object)
     for node in graph.nodes:
-        for attribute, value in node.states:
+        _check_category(node, domain)
+        for attribute, value in () if learnt else node.states:
             if attribute not in domain.attributes:
                 raise UnknownNameError(f"attribute of {node.id}", attribute, domain.attributes)
             if value is not None and value not in domain.values(attribute):
@@ -140,3 +146,21 @@ def _check(graph: SceneGraph, domain: Domain) -> None:
     except CycleError as error:
         chain = ", ".join(dict.fromkeys(error.args[1]))
         raise InputError(f"{chain}: a thing cannot be in or on itself") from error
+
+
+def _check_category(node: ObjectNode, domain: Domain) -> None:
+    """What is a state or a relation of the domain, and no category, is none."""
+    word = node.category
+    if domain.find(word) is not None or word == category_of(node.id):
+        return
+    if word in domain.relations:
+        raise InputError(
+            f"{node.id} is said to be of the category {word!r}, which is a relation: write "
+            f'["{node.id}", "{word}", ...] among the relations'
+        )
+    for attribute in domain.attributes.values():
+        if word in attribute.values:
+            raise InputError(
+                f"{node.id} is said to be of the category {word!r}, which is a state: write "
+                f'"{node.id}": {{"{attribute.name}": "{word}"}}'
+            )

@@ -10,6 +10,7 @@ from cyclopts import App
 import forestall
 from forestall.cli import experiments
 from forestall.cli.bench import bench
+from forestall.cli.calibrate import calibrate
 from forestall.cli.cases import cases
 from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
@@ -20,6 +21,8 @@ from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
 from forestall.cli.parts import parts
+from forestall.cli.plan import plan
+from forestall.cli.preconditions import preconditions
 from forestall.cli.run import run
 from forestall.errors import InputError
 
@@ -29,7 +32,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, page, tasks, scenarios, parts, check, compare, doctor):
+for command in (run, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
 app.command(demos)
 app.command(domain)
@@ -37,6 +40,8 @@ app.command(bench)
 app.command(cases)
 experiments.register(bench)
 app.command(encoder)
+app.command(plan)
+app.command(preconditions)
 
 
 def answer(arguments: Sequence[str]) -> int:

@@ -141,10 +141,13 @@ def label(
     subtask: str,
     fact: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     task: str = "",
+    domain: str | None = None,
+    new: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Keep what somebody says should hold before a subtask.
 
-    One label is enough for an alarm; its cause says that it is one.
+    One label is enough for an alarm; its cause says that it is one. A word that is nearly one of
+    the memory, of the scene or of the domain is taken for a slip of the pen.
 
     Args:
         memory: the demonstration file to add to; made when it does not exist.
@@ -152,9 +155,25 @@ def label(
         subtask: before which, e.g. "insert(peg-1, hole-1)".
         fact: instead of a scene, or beside it: "surface(hole-1)=clean", "held_by(peg-1, gripper)".
         task: the name of its task.
+        domain: whose words it is in, by name or file; by default those of the memory.
+        new: words that are nearly known ones are new ones.
     """
+    from forestall.assembly.labels import KnownWords, check_label
     from forestall.assembly.sources import labelled
+    from forestall.domain.load import load_domain
+    from forestall.memory.store import open_store
+    from forestall.types.facts import Literal
+    from forestall.types.plan import Subtask
 
+    known = KnownWords()
+    if domain is not None:
+        known.add_domain(load_domain(domain))
+    if memory.exists() and memory.stat().st_size:
+        with open_store(memory) as store:
+            known.add_demonstrations(store.all())
+    if scene is not None:
+        known.add_graph(labelled(subtask, scene).steps[0].whole)
+    check_label(Subtask.parse(subtask), list(map(Literal.parse, fact or ())), known, new=new)
     return _kept(memory, [labelled(subtask, scene, fact or (), task)])
 
 
@@ -216,6 +235,7 @@ def memory_of(config: RunConfig, quiet: bool) -> tuple[list[Demonstration], str]
     """
     from forestall.assembly.demonstrations import load_memory, memory_path, ready_made
     from forestall.cli.progress import bar
+    from forestall.errors import MemoryFileError
 
     def announce(text: str) -> None:
         print(f"forestall: {text}", file=sys.stderr)
@@ -223,4 +243,12 @@ def memory_of(config: RunConfig, quiet: bool) -> tuple[list[Demonstration], str]
     if memory_path(config) is None:
         with bar("recording", quiet=quiet) as feed:
             ready_made(config, announce, feed)
-    return load_memory(config)
+    try:
+        return load_memory(config)
+    except MemoryFileError as error:
+        path = memory_path(config)
+        if path is None or not config.task or Path(path).exists():
+            raise
+        own = "" if config.domain is None else f" --domain {config.domain}"
+        how = f"'forestall demos record {path} --task {config.task}{own}'"
+        raise MemoryFileError(f"{error}, or record the task's own with {how}") from error

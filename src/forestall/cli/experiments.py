@@ -60,7 +60,7 @@ class Options:
     sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     profiles: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
-    part: float = 0.12
+    part: float = 0.1
     quick: Flag = False
     demonstrations: int = 8
     out: Path | None = None

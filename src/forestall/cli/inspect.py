@@ -105,7 +105,8 @@ def check(
         explain: a picture to write of what was understood: masks with their names, the scene from
             above; also of what is refused.
         memory: a demonstration file; the ready-made one of the task by default.
-        domain: what everything is read in: a name, or a file (.toml, .pddl); the task's by default.
+        domain: what everything is read in: a name, or a file (.toml, .pddl); by default the task's,
+            else one that has the skills of the memory, else one that is learnt from it.
         threshold: alarm when no demonstration reaches this score.
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
@@ -149,11 +150,29 @@ def check(
     found = judge_stored(scenes, question, demonstrations, given, path, page is not None)
     if page is not None:
         write_page(found.record, page)
+    if path is not None:
+        _tell_stale(Path(path), domain)
+    if found.limits:
+        print(
+            f"forestall: the domain is learnt from {path}; what it cannot know: "
+            "'forestall domain learn'",
+            file=sys.stderr,
+        )
     if as_json:
         print(json.dumps(_judgements_json(found, path, page), indent=2))
     else:
         _tell(found, page)
     return _code(found)
+
+
+def _tell_stale(memory: Path, domain: str | None) -> None:
+    """Say which corrections beside a memory change nothing any more."""
+    from forestall.assembly.corrections import beside
+    from forestall.assembly.mined import remembered
+    from forestall.cli.preconditions import given_domain, tell_stale
+
+    if beside(memory).is_file():
+        tell_stale(remembered(memory, given_domain(domain)))
 
 
 def _code(found: Judgements) -> int:
@@ -170,6 +189,7 @@ def _judgements_json(found: Judgements, memory: str | None, page: Path | None) -
         "domain": record.task.domain,
         "plan": record.initial_plan.texts(),
         "memory": memory,
+        "limits": list(found.limits),
         "page": None if page is None else str(page),
         "scenes": [_judgement_json(j) for j in found.each],
     }

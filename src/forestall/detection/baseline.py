@@ -57,7 +57,7 @@ def judged(
         detector,
         score,
         config.threshold,
-        config.calibration,
+        Calibration.FIXED,
         nearest=nearest,
         references=references,
         note=f"compared with {compared} of {references} demonstrations",

@@ -8,11 +8,13 @@ that is otherwise alike.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from forestall.calibration.fitted import JudgeThresholds
+from forestall.comparison.corrections import Corrections
 from forestall.comparison.preconditions import MiningConfig, mine, violations
 from forestall.comparison.relevance import counts
-from forestall.detection.scene_graph import NO_REFERENCE
+from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.types.facts import Literal, Truth
@@ -46,14 +48,12 @@ class PreconditionConfig:
             is below. The weight is the rule of succession over its support, (s + 1) / (n + 2): one
             demonstration weighs 0.67, twelve weigh 0.93. With 0.5 every violation is an alarm; a
             lower one asks for more demonstrations than one.
-        calibration: where the threshold comes from.
 
     Raises:
         InputError: a threshold that is not between 0 and 1.
     """
 
     threshold: float = 0.5
-    calibration: Calibration = Calibration.FIXED
 
     def __post_init__(self) -> None:
         if not 0 <= self.threshold <= 1:
@@ -73,6 +73,9 @@ class PreconditionDetector:
         domain: what facts there are about arguments.
         mining: how much evidence a precondition needs.
         config: the threshold.
+        thresholds: from a calibration, which has counted the alarms of good runs: as a judge that
+            says yes or no it may alarm or it may not, whatever the weight.
+        corrections: what a person says of what is mined.
     """
 
     name = "preconditions"
@@ -82,16 +85,37 @@ class PreconditionDetector:
         domain: Domain,
         mining: MiningConfig | None = None,
         config: PreconditionConfig | None = None,
+        thresholds: JudgeThresholds | None = None,
+        corrections: Corrections | None = None,
     ) -> None:
         self._domain = domain
         self._mining = mining or MiningConfig()
         self._config = config or PreconditionConfig()
+        self._thresholds = thresholds
+        self._corrections = corrections
         self._mined: dict[object, tuple[Precondition, ...]] = {}
 
     def judge(
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """See which mined preconditions hold on the scoped graph of a boundary."""
+        verdict = self._judge(observed, references)
+        if self._thresholds is None or verdict.score is None:
+            return verdict
+        fits = 0.0 if verdict.decision is Decision.REPLAN else 1.0
+        line = drawn(self._thresholds, observed.subtask, 1.0)
+        verdict = replace(
+            verdict,
+            calibration=line.calibration,
+            note="; ".join(n for n in (verdict.note, line.note) if n),
+            p_value=rarity(self._thresholds, observed.subtask, fits),
+        )
+        if line.value > 0 or verdict.decision is not Decision.REPLAN:
+            return verdict
+        note = f"no alarm, because too many good runs had one; {verdict.note}"
+        return replace(verdict, decision=Decision.PROCEED, threshold=0.0, note=note, lacking=())
+
+    def _judge(self, observed: SceneGraph, references: Sequence[Reference]) -> Verdict:
         subtask = observed.subtask
         if subtask is None or not references:
             return self._verdict(Decision.PROCEED, None, references, NO_REFERENCE)
@@ -136,7 +160,11 @@ class PreconditionDetector:
         if key not in self._mined:
             if len(self._mined) >= _KEPT:
                 self._mined.clear()
-            self._mined[key] = mine(references, self._domain, self._mining, subtask=subtask)
+            found = mine(references, self._domain, self._mining, subtask=subtask)
+            if self._corrections is not None:
+                task = references[0].task
+                found = self._corrections.over(found, subtask, task, self._domain)
+            self._mined[key] = found
         return self._mined[key]
 
     def _verdict(
@@ -147,13 +175,12 @@ class PreconditionDetector:
         note: str = "",
         lacking: tuple[Literal, ...] = (),
     ) -> Verdict:
-        config = self._config
         return Verdict(
             decision,
             self.name,
             score,
-            config.threshold,
-            Calibration.UNCALIBRATED if score is None else config.calibration,
+            self._config.threshold,
+            Calibration.UNCALIBRATED if score is None else Calibration.FIXED,
             nearest=references[0] if references else None,
             references=demonstrations_of(references),
             note=note,
@@ -162,15 +189,18 @@ class PreconditionDetector:
 
 
 def weight(violation: Violation) -> float:
-    """How much a precondition weighs by its evidence: the rule of succession."""
+    """How much a precondition weighs: the rule of succession; what a person says weighs 1."""
     p = violation.precondition
-    return (p.support + 1) / (p.total + 2)
+    return 1.0 if p.by_hand else (p.support + 1) / (p.total + 2)
 
 
 def _listed(what: str, found: Sequence[Violation]) -> str:
-    texts = [
-        f"{v.literal} (held in {v.precondition.support} of {v.precondition.total})"
-        for v in found[:_TOLD]
-    ]
+    texts = [f"{v.literal} ({_evidence(v.precondition)})" for v in found[:_TOLD]]
     more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return f"{what}: {', '.join(texts)}{more}"
+
+
+def _evidence(precondition: Precondition) -> str:
+    if precondition.by_hand:
+        return "a correction by hand"
+    return f"held in {precondition.support} of {precondition.total}"

@@ -8,14 +8,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from forestall.calibration.fitted import JudgeThresholds
 from forestall.errors import InputError
 from forestall.seams import GraphScorer
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import Observation
+from forestall.types.plan import Subtask
 from forestall.types.verdict import (
     Calibration,
     Decision,
     Reference,
+    Threshold,
     Verdict,
     demonstrations_of,
 )
@@ -33,7 +36,6 @@ class DetectorConfig:
     """
 
     threshold: float = 0.9
-    calibration: Calibration = Calibration.FIXED
     located_share: float = 0.5
 
     def __post_init__(self) -> None:
@@ -57,6 +59,8 @@ class SceneGraphDetector:
         scorer: compares graphs.
         config: the threshold.
         name: told apart where several, each with a part of the score left out, watch one run.
+        thresholds: from a calibration; where it has none, the configured one stands and is called
+            uncalibrated.
     """
 
     name = "scene-graph"
@@ -66,16 +70,18 @@ class SceneGraphDetector:
         scorer: GraphScorer,
         config: DetectorConfig | None = None,
         name: str = name,
+        thresholds: JudgeThresholds | None = None,
     ) -> None:
         self.name = name
         self._scorer = scorer
         self._config = config or DetectorConfig()
+        self._thresholds = thresholds
 
     def judge(
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """Compare the scoped graph of a boundary with every reference."""
-        config = self._config
+        line = drawn(self._thresholds, observed.subtask, self._config.threshold)
         able = [r for r in references if not unseen_by(r, observed)]
         best = self._scorer.best(observed, able)
         if best is None or best.score is None:
@@ -84,7 +90,7 @@ class SceneGraphDetector:
                 Decision.PROCEED,
                 self.name,
                 None,
-                config.threshold,
+                line.value,
                 Calibration.UNCALIBRATED,
                 references=demonstrations_of(references),
                 note=NOT_COMPARABLE.format(", ".join(unknown)) if references else NO_REFERENCE,
@@ -92,17 +98,35 @@ class SceneGraphDetector:
         verdict = replace(
             best,
             detector=self.name,
-            threshold=config.threshold,
-            calibration=config.calibration,
+            threshold=line.value,
+            calibration=line.calibration,
             references=demonstrations_of(able),
+            note=line.note,
+            p_value=rarity(self._thresholds, observed.subtask, best.score),
         )
-        if best.score >= config.threshold:
+        if best.score >= line.value:
             return replace(verdict, decision=Decision.PROCEED)
-        unseen = unseen_arguments(observed, references, config.located_share)
+        unseen = unseen_arguments(observed, references, self._config.located_share)
         if unseen:
             note = f"not located here, but in the demonstrations: {', '.join(unseen)}"
             return replace(verdict, decision=Decision.LOOK_AGAIN, note=note)
         return replace(verdict, decision=Decision.REPLAN)
+
+
+def drawn(thresholds: JudgeThresholds | None, subtask: Subtask | None, own: float) -> Threshold:
+    """Where a detector draws the line before a subtask: calibrated, or by its own threshold."""
+    if thresholds is None or subtask is None:
+        return Threshold(own)
+    return thresholds.threshold(subtask.skill, own)
+
+
+def rarity(
+    thresholds: JudgeThresholds | None, subtask: Subtask | None, score: float
+) -> float | None:
+    """The p-value of a score; None where nothing was calibrated."""
+    if thresholds is None or subtask is None:
+        return None
+    return thresholds.p_value(subtask.skill, score)
 
 
 def unseen_arguments(

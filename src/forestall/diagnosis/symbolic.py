@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from forestall.comparison.corrections import Corrections
 from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
@@ -54,14 +55,22 @@ class SymbolicReasoner:
         mine: references → what held before the subtask in all of them, lifted.
         violations: preconditions → those that do not hold on a graph, ground.
         domain: the categories.
+        corrections: what a person says of what held before subtasks.
     """
 
     name = "preconditions"
 
-    def __init__(self, mine: Miner, violations: Violations, domain: Domain) -> None:
+    def __init__(
+        self,
+        mine: Miner,
+        violations: Violations,
+        domain: Domain,
+        corrections: Corrections | None = None,
+    ) -> None:
         self.mine = mine
         self.violations = violations
         self.domain = domain
+        self.corrections = corrections
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         """Name the violated facts about the subtask's arguments; unobserved ones do not count."""
@@ -71,6 +80,10 @@ class SymbolicReasoner:
         preconditions = self.mine(
             context.references, self.domain, subtask=subtask, task=context.task.name
         )
+        if self.corrections is not None and when is When.BEFORE:
+            preconditions = self.corrections.over(
+                preconditions, subtask, context.task.name, self.domain
+            )
         broken = [
             v
             for v in self.violations(preconditions, graph, subtask, self.domain)
@@ -127,6 +140,8 @@ def explain(
 ) -> str:
     """One sentence: what is the case, and what it was in the demonstrations."""
     literal, p, roles = violation.literal, violation.precondition, domain.roles
+    if p.by_hand:
+        return _by_hand(literal, graph, subtask, domain)
     when = in_demonstrations(p.support, p.total)
     name = literal.args[0] if literal.args else ""
     predicate, yes = literal.predicate, literal.value == "true"
@@ -156,6 +171,21 @@ def explain(
     if literal.value == "false":
         return f"{name} is {relation}; it was not {when}"
     return f"{name} is not {relation}; it was {when}"
+
+
+def _by_hand(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain) -> str:
+    """What a person says must hold, and does not."""
+    name, said = literal.args[0] if literal.args else "", "a person says that it must be"
+    if literal.is_state:
+        node = graph.get(name)
+        now = None if node is None else node.state(literal.predicate)
+        seen = "in an unknown state" if now is None else domain.say(literal.predicate, now)
+        must = domain.say(literal.predicate, literal.value)
+        return f"{name} is {seen}; {said} {must} before {subtask.skill}"
+    known = domain.derived.get(literal.predicate)
+    words = None if known is None else known.opposite if literal.value == "true" else known.words
+    now_so = words.format(*literal.args) if words else f"{literal} does not hold"
+    return f"{now_so}; {said} otherwise before {subtask.skill}"
 
 
 def in_demonstrations(support: int, total: int) -> str:
@@ -202,13 +232,16 @@ def _blockers(graph: SceneGraph, name: str, domain: Domain) -> tuple[str, ...]:
 
 
 def _closed(graph: SceneGraph, name: str, domain: Domain) -> str:
-    for parent in graph.parents(name, domain.containing):
-        node = graph.get(parent)
-        if node is not None and is_shut(domain, node.category, dict(node.states)) is Truth.TRUE:
-            return parent
-        above = _closed(graph, parent, domain)
-        if above:
-            return above
+    """What shuts a thing in, the nearest first; two things may be taken to hold each other."""
+    pending, known = [name], {name}
+    while pending:
+        for parent in graph.parents(pending.pop(), domain.containing):
+            node = graph.get(parent)
+            if node is not None and is_shut(domain, node.category, dict(node.states)) is Truth.TRUE:
+                return parent
+            if parent not in known:
+                known.add(parent)
+                pending.append(parent)
     return ""
 
 

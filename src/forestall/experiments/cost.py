@@ -13,19 +13,19 @@ from dataclasses import dataclass
 from forestall.experiments.runs import Run
 from forestall.statistics.rows import NOBODY
 
-FIRST_S = 0.75
+FIRST_S = 0.65
 """Seconds of one core for a step of the watched run: nearly all is drawn for the first time."""
 
 AGAIN_S = 0.09
 """For a step of a run in which nobody steps in: it sees what was drawn for the watched one."""
 
-APART_S = 0.6
+APART_S = 0.61
 """For a step of a run in which somebody does: it parts from the watched one sooner or later."""
 
 DEMONSTRATION_S = 1.1
 """For a step of a demonstration, tries that did not succeed included."""
 
-ROW_BYTES = 12_000
+ROW_BYTES = 10_000
 """Of an episode in the folder, its page apart."""
 
 

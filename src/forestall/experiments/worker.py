@@ -338,7 +338,7 @@ def _memory(
 ) -> tuple[tuple[Demonstration, ...], str]:
     config = run_config(task, given=_household(profile, settings))
     demonstrations, path = load_memory(config, workers=1, varied=ways, second=second_of(profile))
-    return tuple(demonstrations), path
+    return tuple(demonstrations), Path(path).name
 
 
 __all__ = [

@@ -124,7 +124,7 @@ def _skill(
         name,
         parameters,
         needs=tuple(
-            _need(x, predicates[x.predicate], len(found))
+            _need(x, predicates[x.predicate], found)
             for x in sorted(frozenset.intersection(*before))
         ),
         effects=(Effect(facts=effects),) if effects else (),
@@ -165,12 +165,14 @@ def _effects(
     return tuple(sorted(begun | ended))
 
 
-def _need(literal: Literal, predicate: Predicate, times: int) -> Need:
+def _need(literal: Literal, predicate: Predicate, found: Sequence[Trace]) -> Need:
     args = [a.replace("?", "{") + "}" if a.startswith("?") else a for a in literal.args]
     said = f"{args[0]} is not {literal.value}" if literal.is_state else predicate.opposite
     for position, name in enumerate(args):
         said = said.replace(f"{{{position}}}", name)
-    often = "in the only demonstrated use" if times == 1 else f"in all {times} demonstrated uses"
+    runs, uses = len({t.demonstration for t in found}), len(found)
+    often = "in the only demonstration there is" if runs == 1 else f"in all {runs} demonstrations"
+    often += f" ({uses} uses)" if uses > runs else ""
     return Need(literal, f"{said}, unlike {often}", (literal,))
 
 

@@ -96,7 +96,7 @@ class EmbeddingRetriever:
         ]
         if not self._entries:
             raise MemoryFileError(
-                "the memory holds no demonstrations: record some with 'forestall demos record'"
+                "the memory holds no demonstrations: add some with 'forestall demos add'"
             )
         self._matrix = encoder.encode(
             [subtask_words(e.step.subtask, domain) for e in self._entries]

@@ -56,7 +56,7 @@ def open_store(path: str | Path, create: bool = False, busy_timeout_s: float = 5
     fresh = not path.exists() or path.stat().st_size == 0
     if fresh and not create:
         what = "is an empty file" if path.exists() else "does not exist"
-        raise MemoryFileError(f"memory {path} {what}: make one with 'forestall demos record'")
+        raise MemoryFileError(f"memory {path} {what}: make one with 'forestall demos add'")
     if not fresh:
         _check_header(path)
     writable = os.access(path if path.exists() else path.parent, os.W_OK)
@@ -193,8 +193,7 @@ class SqliteStore:
         found = self.all()
         if not found:
             raise MemoryFileError(
-                f"memory {self.path} holds no demonstrations: "
-                "record some with 'forestall demos record'"
+                f"memory {self.path} holds no demonstrations: add some with 'forestall demos add'"
             )
         return found
 
@@ -250,7 +249,7 @@ class SqliteStore:
             if version != SCHEMA_VERSION:
                 raise MemoryFileError(
                     f"memory {self.path} has schema version {version}, this version of forestall "
-                    f"reads {SCHEMA_VERSION}: record it again with 'forestall demos record'"
+                    f"reads {SCHEMA_VERSION}: make it again from its runs"
                 )
             least, most = own_schemas()
             if not least <= self._schema() <= most:

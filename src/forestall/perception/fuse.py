@@ -20,7 +20,7 @@ from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
-from forestall.perception.support import Parent, parents
+from forestall.perception.support import Parent, circular, parents
 from forestall.perception.tracks import (
     Fate,
     Fates,
@@ -270,6 +270,9 @@ class SceneMemory:
             track = self.tracks[name]
             track.parent = found.get(name) or self._former_parent(track)
         links = {n: t.parent for n, t in self.tracks.items() if t.parent is not None}
+        for name in circular(links, found):
+            self.tracks[name].parent = None
+            del links[name]
         relations = [Relation(n, predicate, r) for n, (predicate, r) in links.items()]
         if self._domain.roles.holding is not None:
             relations += [

@@ -9,7 +9,7 @@ Called by `fuse.py`.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -45,6 +45,28 @@ def parents(
         if parent is not None:
             found[thing.id] = parent
     return found
+
+
+def circular(links: Mapping[str, Parent], seen: Collection[str]) -> list[str]:
+    """Whose links must go so that nothing holds what holds it.
+
+    A thing that was on another can be seen beneath it while the other is out of view: of links in a
+    circle one that is only remembered goes, else the last by name.
+
+    Args:
+        links: thing → what it is in or on.
+        seen: things whose links come from the newest views.
+    """
+    left, gone = dict(links), []
+    for name in sorted(links):
+        circle = [name]
+        while (parent := left.get(circle[-1])) is not None and parent[1] not in circle:
+            circle.append(parent[1])
+        if parent is not None and parent[1] == name:
+            remembered = sorted(n for n in circle if n not in seen)
+            gone.append((remembered or sorted(circle))[-1])
+            del left[gone[-1]]
+    return gone
 
 
 def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> Parent | None:

@@ -222,7 +222,7 @@ def _choose(
             names[variable.name] = found[0]
             return
     if choice.sentence:
-        raise _RefusedError(_said(state, choice.sentence, names, {}))
+        raise _RefusedError(said(state, choice.sentence, names, {}))
 
 
 def _spread(effects: Iterable[Effect], made: Mapping[str, tuple[str, ...]]) -> Iterable[Effect]:
@@ -258,7 +258,7 @@ def _refused(state: State, need: Need, names: Mapping[str, str]) -> _RefusedErro
     lacking = [x.bind(binding) for x in need.lacking]
     lacking = [x for x in lacking if not any(a.startswith("?") for a in x.args)]
     sentence = need.sentence or f"{{what}} does not hold ({_plain(need.formula, binding)})"
-    return _RefusedError(_said(state, sentence, names, found), *lacking)
+    return _RefusedError(said(state, sentence, names, found), *lacking)
 
 
 def _plain(formula: Formula, names: Mapping[str, str]) -> str:
@@ -267,7 +267,9 @@ def _plain(formula: Formula, names: Mapping[str, str]) -> str:
     return show(bind(formula, names))
 
 
-def _said(state: State, sentence: str, names: Mapping[str, str], found: Mapping[str, str]) -> str:
+def said(state: State, sentence: str, names: Mapping[str, str], found: Mapping[str, str]) -> str:
+    """A sentence of the domain about the things that its variables stand for."""
+
     def word(match: re.Match[str]) -> str:
         name = match[1]
         if name == "hand":

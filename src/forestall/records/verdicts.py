@@ -75,6 +75,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         ],
         "note": verdict.note,
         "lacking": [str(x) for x in verdict.lacking],
+        "p_value": verdict.p_value,
     }
 
 
@@ -93,6 +94,7 @@ def verdict_from(field: Field) -> Verdict:
         references=field["references"].whole(),
         note=field["note"].text(),
         lacking=field["lacking"].tuple_of(literal),
+        p_value=field.optional("p_value", Field.number),
     )
 
 

@@ -265,7 +265,7 @@ def _validated(model: type[M], source: str, text: str) -> M:
 def _task(source: str, data: TaskFile, read_in: Callable[[], Domain]) -> LoadedTask:
     try:
         domain = _extended(read_in(), data)
-        goal = _goal(data.goal, domain)
+        goal = goal_from(data.goal, domain)
         plan = domain.check_plan(Plan.parse(data.plan, data.goal.text))
         for subtask in plan:
             for name in subtask.args:
@@ -288,7 +288,12 @@ def _extended(domain: Domain, data: TaskFile) -> Domain:
     return extend(domain, data.categories, attributes)
 
 
-def _goal(data: GoalFile, domain: Domain) -> Goal:
+def goal_from(data: GoalFile, domain: Domain) -> Goal:
+    """A goal as a task file has it, every name checked.
+
+    Raises:
+        InputError: a name that means nothing, or a fact that nothing can meet.
+    """
     for variable, category in data.variables.items():
         if not variable.startswith("?"):
             raise InputError(f"goal variable {variable!r} must start with '?'")

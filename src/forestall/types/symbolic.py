@@ -49,6 +49,8 @@ def scene_graph(data: SceneGraph | Mapping[str, Any]) -> SceneGraph:
     if not isinstance(objects, Mapping):
         objects = {str(name): {} for name in _listed("objects", objects)}
     unseen = {str(x) for x in _listed("unseen", data.get("unseen", ()))}
+    for name, said in objects.items():
+        _no_relation(str(name), said, {*map(str, objects), GRIPPER})
     nodes = {str(n): _node(str(n), said, str(n) in unseen) for n, said in objects.items()}
     relations = [_relation(r) for r in _listed("relations", data.get("relations", ()))]
     if any(GRIPPER in (r.subject, r.object) for r in relations):
@@ -99,6 +101,36 @@ def _node(name: str, said: Any, unseen: bool) -> ObjectNode:
         located,
         Seen.UNOBSERVED if unseen else Seen.VISIBLE,
     )
+
+
+def _no_relation(name: str, said: Any, ids: Iterable[str]) -> None:
+    """See that nothing is said of a thing where its category or a state is expected.
+
+    Raises:
+        InputError: a text that names another thing, or a fact.
+    """
+    if isinstance(said, str):
+        words = said.split()
+        others = [w for w in words[1:] if w in ids]
+        if others:
+            relation = "_".join(w for w in words if w not in ids) or "relation"
+            raise InputError(
+                f"object {name!r}: {said!r} stands in the place of its category and is a relation: "
+                f'write ["{name}", "{relation}", "{others[-1]}"] among the relations'
+            )
+        if re.search(r"[=():]", said):
+            raise InputError(
+                f"object {name!r}: {said!r} stands in the place of its category and is a state: "
+                f'write "{name}": {{"attribute": "value"}}'
+            )
+    elif isinstance(said, Mapping):
+        for attribute, value in said.items():
+            if attribute != "category" and isinstance(value, str) and value in ids:
+                raise InputError(
+                    f"object {name!r}: {attribute} is said to be {value!r}, which is a thing: "
+                    f'write ["{name}", "{word(attribute, "relation")}", "{value}"] among the '
+                    "relations"
+                )
 
 
 def _value(name: str, attribute: object, value: Any) -> str | None:

@@ -33,6 +33,22 @@ class Calibration(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Threshold:
+    """Where a detector draws the line, and what that rests on.
+
+    Args:
+        value: scores below it are alarms.
+        calibration: where it comes from; a calibration that cannot bound false alarms here leaves
+            the detector's own threshold and is called uncalibrated.
+        note: the same in words, "" where somebody fixed it.
+    """
+
+    value: float
+    calibration: Calibration = Calibration.FIXED
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Reference:
     """A retrieved demonstration step: its graph just before the subtask."""
 
@@ -88,7 +104,7 @@ class Precondition:
     """A lifted literal that held in the demonstrations before a skill.
 
     `literal` uses ?object and ?target (and category names for other things). `support` of `total`
-    demonstrations had it true; the others had it unobserved or false.
+    demonstrations had it true; the others had it unobserved or false. `by_hand`: a person says so.
     """
 
     skill: str
@@ -96,6 +112,7 @@ class Precondition:
     support: int
     total: int
     weight: float = 1.0
+    by_hand: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +145,7 @@ class Verdict:
     references: int = 0  # demonstrations that there was something to compare with of
     note: str = ""
     lacking: tuple[Literal, ...] = ()  # facts that should hold and do not, where it knows any
+    p_value: float | None = None  # how rare a score this low is in good runs; None: not calibrated
 
     def __post_init__(self) -> None:
         if not isinstance(self.decision, Decision):

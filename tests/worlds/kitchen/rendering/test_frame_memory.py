@@ -71,3 +71,9 @@ def test_what_was_not_asked_for_the_longest_time_is_forgotten() -> None:
     memory.keep(b"c", Drawn(frame(3)))
     assert memory.get(b"b") is None
     assert memory.get(b"a") is not None and memory.get(b"c") is not None
+
+
+def test_what_is_held_is_counted() -> None:
+    large = np.zeros((720, 960, 3), np.uint8)
+    part = Frame(large[:72, :96], np.ones((72, 96), np.float32), SMALL, np.eye(4))
+    assert Drawn(part).nbytes == large.nbytes + 72 * 96 * 4

@@ -6,6 +6,7 @@ Made by `picture`, kept by `memory`, read by `redrawing`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from sys import getsizeof
 from typing import Any
 
 import numpy as np
@@ -69,10 +70,19 @@ class Drawn:
 
     @property
     def nbytes(self) -> int:
-        """Of the arrays that belong to this frame alone."""
-        frame, basis = self.frame, self.basis
+        """Of the memory that is held for it: an array that shows a part of another holds it all."""
+        frame, basis, content = self.frame, self.basis, self.content
         arrays: list[npt.NDArray[Any] | None] = [frame.rgb, frame.depth_m, frame.instance_ids]
         if basis is not None:
             arrays += [basis.geom, basis.normal, basis.reach, basis.smoothed]
             arrays += [basis.own_at, basis.own_points]
-        return sum(a.nbytes for a in arrays if a is not None)
+        digests = 0
+        if content is not None:
+            arrays += [content.corners_m, content.instance, content.clear]
+            digests = sum(map(getsizeof, (*content.look, *content.form)))
+        return digests + sum(_held(a).nbytes for a in arrays if a is not None)
+
+
+def _held(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The array whose memory another one shows a part of."""
+    return _held(array.base) if isinstance(array.base, np.ndarray) else array
