@@ -13,6 +13,7 @@ from typing import Protocol
 from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
+from forestall.records.sentences import in_demonstrations
 from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
@@ -98,6 +99,7 @@ class SymbolicReasoner:
             must_stay=tuple(sorted(stay)),
             culprits=tuple(culprits),
             producer=self.name,
+            support=(broken[0].precondition.support, broken[0].precondition.total),
         )
 
     def _nothing(self, cause: str) -> Diagnosis:
@@ -156,14 +158,6 @@ def explain(
     if literal.value == "false":
         return f"{name} is {relation}; it was not {when}"
     return f"{name} is not {relation}; it was {when}"
-
-
-def in_demonstrations(support: int, total: int) -> str:
-    """In how many demonstrations something held; thin evidence is called so."""
-    if total == 1:
-        return "in the only demonstration there is"
-    many = f"all {total}" if support == total else f"{support} of {total}"
-    return f"in {many} demonstrations"
 
 
 def _rank(literal: Literal, domain: Domain) -> int:
