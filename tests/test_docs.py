@@ -73,4 +73,4 @@ def test_the_page_for_ones_own_robot_runs_and_prints_what_it_says(
         else:
             (tmp_path / "one.json").write_text(text, encoding="utf-8")
             assert call(["demos", "add", "other.db", "one.json"]) == 0
-    assert [k for k, _ in blocks].count("python") == 5
+    assert [k for k, _ in blocks].count("python") == 6

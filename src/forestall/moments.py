@@ -11,9 +11,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from forestall.conclusion import MonitorConfig, conclude
+from forestall.domain.model import Domain
 from forestall.errors import ObservationError, PartError
 from forestall.in_a_row import Streaks
 from forestall.records.boundary import boundary_record
+from forestall.records.sentences import in_sentences
 from forestall.run_state import RunState
 from forestall.supervised import SupervisedParts
 from forestall.supervision import part_error
@@ -83,7 +85,7 @@ class Moments:
     ) -> MonitorDecision:
         """What a strategy's answer comes to; a new plan is adopted here."""
         decision = conclude(context, answer, self._config, self._strategy)
-        steps_in = not answer.watched  # who only watches interrupts nothing, and is not interrupted
+        steps_in = not answer.only_watched  # who interrupts nothing is not interrupted
         if steps_in and (why := run.streaks.after(decision, self._config.limits)):
             run.streaks = Streaks()
             hold = Hold.TOO_MANY
@@ -173,6 +175,7 @@ class Moments:
     ) -> MonitorDecision:
         """The decision with the record of its moment, which is over unless another look follows."""
         after = context.when is When.AFTER
+        sentence = _told(context, decision, answer, self._parts.domain)
         record = boundary_record(
             run.boundary - after,
             context,
@@ -181,6 +184,7 @@ class Moments:
             run.since,
             run.seconds,
             run.time_s,
+            sentence,
         )
         run.mark()
         if decision.outcome is Outcome.LOOK:
@@ -188,7 +192,19 @@ class Moments:
         else:
             run.looks = 0
             run.boundary += not after
-        return replace(decision, context=context, record=record, seconds=record.seconds)
+        return replace(
+            decision, context=context, record=record, seconds=record.seconds, sentence=sentence
+        )
+
+
+def _told(
+    context: BoundaryContext, decision: MonitorDecision, answer: StrategyAnswer, domain: Domain
+) -> str:
+    """What the owner is told; words that cannot be found change no decision."""
+    try:
+        return in_sentences(context, decision, answer, domain)
+    except Exception:  # noqa: BLE001 - facts of somebody's own part may be about anything
+        return decision.why
 
 
 def _whole(graph: SceneGraph, subtask: Subtask) -> SceneGraph:

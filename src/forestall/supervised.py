@@ -155,6 +155,11 @@ class SupervisedParts:
             "perceiver", lambda: perceive(observation), "perceive", gives=SceneGraph
         )
 
+    @property
+    def domain(self) -> Domain:
+        """What plans are checked against and decisions are told in."""
+        return self._domain
+
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
         """The part of a graph that concerns a subtask.
 

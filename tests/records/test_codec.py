@@ -106,6 +106,7 @@ def test_the_alarm_says_what_where_and_why() -> None:
             "score": 0.734,
             "threshold": 0.9,
             "cause": records.CAUSE,
+            "sentence": records.SENTENCE,
             "must_change": ["vacant(Microwave-1)"],
             "culprits": ["Bowl-1"],
             "replanned": True,

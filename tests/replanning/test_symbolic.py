@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from forestall.planning.needless import needless_pairs
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator, observed, run
 from forestall.replanning.symbolic import PlannerReplanner
@@ -175,6 +176,7 @@ REPAIRS: dict[str, Repair] = {
         ("filled(Bowl-1)=empty",),
         "",
         ("held_by(Lettuce-1, gripper)",),
+        keeps_rest=False,  # without putting down again what the repair would only pick up for that
     ),
     "wine in the bowl, slice in hand": Repair(
         "make-salad",
@@ -257,6 +259,17 @@ def attempt(case: Repair, config: SearchConfig | None = None) -> tuple[Replan, P
             assert any(s.holds(fact) for s in trace.states), fact
         assert not any("Floor" in s.args[1:] for s in answer.plan)
     return answer, Plan(current.subtasks[index:])
+
+
+def test_what_the_old_plan_puts_down_again_is_not_picked_up_in_between() -> None:
+    case = REPAIRS["wine in the bowl, lettuce in hand"]
+    answer, rest = attempt(case)
+    assert answer.plan is not None
+    put_down = [s for s in answer.plan if s.skill == "put_on"]
+    assert [category_of(s.args[0]) for s in put_down].count("Lettuce") == 1
+    state = observed(scene(home_of(case.task), case.scene), DOMAIN)
+    left = needless_pairs(state, answer.plan.subtasks)
+    assert all(first >= len(answer.plan) - len(rest) for first, _ in left), "the old plan's own"
 
 
 @pytest.mark.parametrize("name", sorted(REPAIRS))

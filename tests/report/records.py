@@ -56,6 +56,7 @@ NOMINAL = (
 INSERTED = ("pick_up(Bowl-1)", "put_on(Bowl-1, CounterTop-2)")
 ALARM_INDEX = 7
 CAUSE = "Bowl-1 stands inside Microwave-1, which takes one thing only"
+SENTENCE = "There is a bowl inside the microwave, so I cannot put the plate into it."
 
 
 def task() -> Task:
@@ -156,6 +157,9 @@ def diagnosis() -> Diagnosis:
         (Literal.parse("on_top_of(Potato-1, Plate-1)"), Literal.parse("dirty(Plate-1)=clean")),
         ("Bowl-1",),
         "symbolic",
+        Subtask.parse("put_in(Plate-1, Microwave-1)"),
+        "Microwave-1 has no room: it already has Bowl-1",
+        (4, 4),
     )
 
 
@@ -193,6 +197,7 @@ def boundary(
         time_s=4.0 * index,
         outcome=Outcome.REPLAN if alarm else Outcome.PROCEED,
         compute_s=tuple((name, (index + 1) * seconds) for name, seconds in PHASES),
+        sentence=SENTENCE if alarm else "",
     )
 
 

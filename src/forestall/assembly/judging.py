@@ -28,7 +28,7 @@ from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.none import NoReasoning
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.domain.distort import Distortion, distorted
-from forestall.errors import InputError
+from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import (
     CAPTIONER,
     DETECTOR,
@@ -51,6 +51,7 @@ from forestall.replanning.symbolic import PlannerReplanner
 from forestall.seams import Detector, Parts, PlanValidator
 from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge, WholeSceneJudge
 from forestall.strategies.online import Online, OnlineScene
+from forestall.strategies.panel import Agree, Panel
 from forestall.strategies.plan_check import PlanChecking
 from forestall.strategies.post_hoc import PostHoc
 from forestall.strategies.proactive import Proactive
@@ -61,6 +62,9 @@ S = TypeVar("S")
 
 _NO_FLOOR = 0.01
 """The paper has no least similarity of two nodes that are matched."""
+
+_SCORE = "score"
+"""How the paper's detector is called among judges."""
 
 _WATCH = signature(Watch).parameters["looks_each"].default
 
@@ -215,15 +219,43 @@ def graph_validator(parts: Parts) -> GraphValidator:
     return GraphValidator(parts.domain)
 
 
-def proactive(parts: Parts, *, max_attempts: int = _PROACTIVE, repeats: bool = False) -> Proactive:
+def proactive(
+    parts: Parts,
+    *,
+    max_attempts: int = _PROACTIVE,
+    repeats: bool = False,
+    judges: tuple[str, ...] = (),
+    judges_agree: Agree = Agree.ANY,
+) -> Proactive:
     """Ours: before each subtask.
 
     Args:
         parts: what it is made of.
         max_attempts: repairs of one cause.
         repeats: whether what the robot says was not done is to be done again.
+        judges: who judges: score, plan-check, or the name of a detector, such as preconditions;
+            several are heard together. By default the run's own detector.
+        judges_agree: whether any of them raises an alarm, or all must.
     """
-    return _stepping_in(partial(Proactive, repeats=repeats), parts, max_attempts)
+    heard = _panel(parts, judges, judges_agree) if judges else None
+    strategy = partial(Proactive, repeats=repeats, panel=heard)
+    return _stepping_in(strategy, parts, max_attempts)
+
+
+def _panel(parts: Parts, judges: tuple[str, ...], agree: Agree) -> Panel:
+    """Judges by name; what the run says of its detector holds for that one alone."""
+    paper, known = SceneGraphDetector.name, parts.declared(DETECTOR)
+    names = [paper if name == _SCORE else name for name in dict.fromkeys(judges)]
+    for name in names:
+        if name not in known and name != PlanChecking.name:
+            raise UnknownNameError("judge", name, (_SCORE, PlanChecking.name, *sorted(known)))
+    detectors = [n for n in dict.fromkeys(names) if n != PlanChecking.name]
+    own = parts.name(DETECTOR)
+    heard = [
+        DetectorJudge(parts.part(DETECTOR) if n == own else parts.part(DETECTOR, n))
+        for n in detectors
+    ]
+    return Panel(heard, PlanChecking.name in names, agree)
 
 
 def post_hoc(parts: Parts, *, max_attempts: int = _POST_HOC) -> PostHoc:

@@ -203,6 +203,7 @@ def _judgement_json(judgement: Judgement) -> dict[str, Any]:
         "subtask": str(record.subtask),
         "outcome": decision.outcome.value,
         "why": decision.why,
+        "sentence": decision.sentence,
         "hold": None if decision.hold is None else decision.hold.value,
         "look_at": [list(point) for point in decision.look_at],
         "verdict": None if verdict is None else _verdict_json(verdict),
@@ -271,6 +272,8 @@ def _tell(found: Judgements, page: Path | None) -> None:
 def _lines(decision: MonitorDecision) -> Iterator[str]:
     """What is said of one scene, below its first line."""
     verdict, diagnosis, replan = decision.verdict, decision.diagnosis, decision.replan
+    if decision.sentence:
+        yield decision.sentence
     if verdict is not None:
         score = "none" if verdict.score is None else f"{verdict.score:.3f}"
         threshold, count = f"{verdict.threshold:.2f}", verdict.references

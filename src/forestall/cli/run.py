@@ -141,6 +141,8 @@ def _summary(data: dict[str, Any]) -> None:
             f"  alarm before {shown(alarm['subtask'])}: {score}: {shown(alarm['cause'] or '')}",
             soft_wrap=True,
         )
+        if alarm["sentence"]:
+            console.print(f"    {shown(alarm['sentence'])}", soft_wrap=True)
     console.print(
         f"  {len(data['executed'])} subtasks, {_count(data['replans'], 'new plan')}, "
         f"{data['simulated_s']:.0f} s of robot time, {data['reasoning_s']:.1f} s of reasoning; "

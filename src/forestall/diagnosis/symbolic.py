@@ -14,6 +14,7 @@ from forestall.comparison.corrections import Corrections
 from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
+from forestall.records.sentences import in_demonstrations
 from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
@@ -111,6 +112,7 @@ class SymbolicReasoner:
             must_stay=tuple(sorted(stay)),
             culprits=tuple(culprits),
             producer=self.name,
+            support=(broken[0].precondition.support, broken[0].precondition.total),
         )
 
     def _nothing(self, cause: str) -> Diagnosis:
@@ -186,14 +188,6 @@ def _by_hand(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Doma
     words = None if known is None else known.opposite if literal.value == "true" else known.words
     now_so = words.format(*literal.args) if words else f"{literal} does not hold"
     return f"{now_so}; {said} otherwise before {subtask.skill}"
-
-
-def in_demonstrations(support: int, total: int) -> str:
-    """In how many demonstrations something held; thin evidence is called so."""
-    if total == 1:
-        return "in the only demonstration there is"
-    many = f"all {total}" if support == total else f"{support} of {total}"
-    return f"in {many} demonstrations"
 
 
 def _rank(literal: Literal, domain: Domain) -> int:

@@ -27,7 +27,7 @@ _FIELDS = {
     "attributes": ATTRIBUTE_FIELDS,
     "categories": (*_but(CATEGORY_FIELDS, "attributes", "defaults"), "world"),
     "skills": ("at", "done_when", "drives", "duration_s", "family", "hand", "prefers", "refusals",
-               "undoes", "words"),
+               "says", "undoes", "words"),
 }  # fmt: skip
 _WHOLE = ("name", "processes", "robot", "roles", "run", "safety", "tags")
 

@@ -240,6 +240,7 @@ class Skill:
         drives: whether it only drives.
         hand: the parameter that is in the hand when it begins.
         words: how a person says it.
+        says: the same with {parameter} for the things: "put {object} on {target}".
         family: skills that do the same thing to different kinds of things.
         undoes: the fact that it is there to end; that it holds before is no need.
         done_when: where this holds the skill succeeds at once and changes nothing.
@@ -257,6 +258,7 @@ class Skill:
     drives: bool = False
     hand: str | None = None
     words: str = ""
+    says: str = ""
     family: str = ""
     undoes: Literal | None = None
     done_when: Formula | None = None

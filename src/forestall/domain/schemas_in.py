@@ -69,12 +69,23 @@ def read_skill(name: str, table: Mapping[str, Any], events: Mapping[str, Any], d
         drives=_flag(label, "drives", table),
         hand=_variable(label, table.get("hand")),
         words=table.get("words", name.replace("_", " ")),
+        says=_says(label, table),
         family=table.get("family", name),
         undoes=None if "undoes" not in table else Literal.parse(table["undoes"]),
         done_when=None if done is None else parse_formula(done),
         duration_s=float(table.get("duration_s", 0.0)),
     )
     return replace(skill, choices=_weighed(skill))
+
+
+def _says(label: str, table: Mapping[str, Any]) -> str:
+    """How a step is said, with its parameters in braces."""
+    said = str(table.get("says", ""))
+    names = [parameter(label, p).name[1:] for p in _list(label, "parameters", table)]
+    for name in re.findall(r"\{(.*?)\}", said):
+        if name not in names:
+            raise UnknownNameError(f"parameter in says of {label}", name, names)
+    return said
 
 
 def _weighed(skill: Skill) -> tuple[Choice, ...]:

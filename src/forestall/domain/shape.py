@@ -73,6 +73,7 @@ class _Skill(_Table):
     drives: Flag = False
     hand: Text | None = None
     words: Text = ""
+    says: Text = ""
     family: Text = ""
     undoes: Text = ""
     done_when: Text = ""

@@ -94,6 +94,7 @@ def boundary_json(
         "diagnosis": None if b.diagnosis is None else diagnosis_json(b.diagnosis),
         "replan": None if b.replan is None else replan_json(b.replan),
         "why": b.why,
+        "sentence": b.sentence,
         "plan_before": [str(s) for s in before],
         "plan_after": None if after is None else [str(s) for s in after],
         "seconds": dict(b.seconds),
@@ -121,6 +122,7 @@ def boundary_from(field: Field) -> BoundaryRecord:
         watched=field["watched"].tuple_of(verdict_from),
         outcome=field.maybe("outcome", lambda f: f.member(Outcome)),
         compute_s=field["compute_s"].pairs(Field.number),
+        sentence=field.optional("sentence", Field.text) or "",
     )
 
 

@@ -19,6 +19,7 @@ def boundary_record(
     before: Mapping[str, float],
     until: Mapping[str, float],
     time_s: float,
+    sentence: str = "",
 ) -> BoundaryRecord:
     """The record of one look at one moment.
 
@@ -30,6 +31,7 @@ def boundary_record(
         before: compute seconds by phase when the boundary began.
         until: the same now.
         time_s: of the robot's clock.
+        sentence: what the owner is told.
     """
     spent = {name: seconds - before.get(name, 0.0) for name, seconds in until.items()}
     return BoundaryRecord(
@@ -49,6 +51,7 @@ def boundary_record(
         watched=tuple(_kept(v) for v in answer.watched),
         outcome=outcome,
         compute_s=tuple(sorted(until.items())),
+        sentence=sentence,
     )
 
 

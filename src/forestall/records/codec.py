@@ -198,6 +198,7 @@ def alarm_json(alarm: Alarm) -> dict[str, Any]:
         "score": alarm.score,
         "threshold": alarm.threshold,
         "cause": alarm.cause,
+        "sentence": alarm.sentence,
         "must_change": alarm.must_change,
         "culprits": alarm.culprits,
         "replanned": alarm.replanned,

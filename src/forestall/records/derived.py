@@ -58,6 +58,7 @@ class Alarm:
     replanned: bool
     outcome: ReplanOutcome | None
     when: When = When.BEFORE  # of the subtask
+    sentence: str = ""  # what the owner is told
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +173,7 @@ def alarm_at(position: int, boundary: BoundaryRecord, plan: Plan | None) -> Alar
         replanned=plan is not None,
         outcome=outcome_of(boundary),
         when=boundary.when,
+        sentence=boundary.sentence,
     )
 
 

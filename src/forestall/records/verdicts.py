@@ -205,6 +205,9 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "must_stay": [str(x) for x in diagnosis.must_stay],
         "culprits": diagnosis.culprits,
         "producer": diagnosis.producer,
+        "step": None if diagnosis.step is None else str(diagnosis.step),
+        "refusal": diagnosis.refusal,
+        "support": diagnosis.support,
     }
 
 
@@ -216,7 +219,17 @@ def diagnosis_from(field: Field) -> Diagnosis:
         must_stay=field["must_stay"].tuple_of(literal),
         culprits=field["culprits"].tuple_of(Field.text),
         producer=field["producer"].text(),
+        step=field.optional("step", subtask),
+        refusal=field.optional("refusal", Field.text) or "",
+        support=field.optional("support", _support),
     )
+
+
+def _support(field: Field) -> tuple[int, int]:
+    numbers = field.tuple_of(Field.whole)
+    if len(numbers) != 2:
+        field.fail("a pair of numbers")
+    return (numbers[0], numbers[1])
 
 
 def replan_json(replan: Replan) -> dict[str, Any]:

@@ -9,20 +9,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from forestall.deadline import Deadline, TimeUp
-from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.planning.goals import alternatives
+from forestall.planning.needless import pruned
 from forestall.planning.planner import Planned, plan_goal, plan_to
 from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
-from forestall.planning.validate import as_checked, observed, unmet, unsupported
+from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
 from forestall.replanning.hidden import hiding_places, sought
+from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
 from forestall.seams import PlanValidator
-from forestall.types.facts import Literal, category_of
+from forestall.types.facts import Literal
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext
 from forestall.types.task import Goal
@@ -114,7 +116,7 @@ class PlannerReplanner:
             for rest in rests:
                 accepted = self._checked(attempts, context, state, (*repair.subtasks, *rest))
                 if accepted is not None:
-                    return accepted
+                    return self._shortened(attempts, context, state, accepted, len(rest), wanted)
             repairs.append(repair)
         for repair in (*repairs[:1], Planned(ReplanOutcome.SOLVED, (), state)):
             if repair.final is None or not context.task.goal.literals:
@@ -132,7 +134,7 @@ class PlannerReplanner:
                 steps = (*repair.subtasks, *onward.subtasks)
                 accepted = self._checked(attempts, context, state, steps)
                 if accepted is not None:
-                    return accepted
+                    return self._shortened(attempts, context, state, accepted, 0, wanted)
         return self._failed(attempts, state, wanted)
 
     def _search(
@@ -151,7 +153,7 @@ class PlannerReplanner:
         for name in lost:
             for place in hiding_places(name, context.graph, self.domain, context.references):
                 opened = Literal(shut, (place,), "false")
-                for kept in (_hand(state, [opened]), []):
+                for kept in (hand(state, [opened]), []):
                     planned = self._to(attempts, state, (opened, *kept))
                     found = self._checked(attempts, context, state, planned.subtasks, Goal(""))
                     if planned.subtasks and found is not None and found.plan is not None:
@@ -173,12 +175,12 @@ class PlannerReplanner:
         Among everything, and not only what matters, is searched where nothing else was found.
         """
         possible = wanted
-        hand = _hand(state, wanted)
-        safe = _unspoiled(state, context.task.goal, wanted)
-        stay = [g for x in must_stay if (g := _as_it_is(state, x)) is not None]
+        held = hand(state, wanted)
+        safe = unspoiled(state, context.task.goal, wanted)
+        stay = [g for x in must_stay if (g := as_it_is(state, x)) is not None]
         tried: set[tuple[Literal, ...]] = set()
         solved = False
-        for kept in ([*hand, *stay], hand, hand[:1], []):
+        for kept in ([*held, *stay], held, held[:1], []):
             facts = tuple(dict.fromkeys((*possible, *kept, *safe)))
             if facts in tried:
                 continue
@@ -205,7 +207,7 @@ class PlannerReplanner:
         widen: bool = False,
     ) -> Planned:
         planned = attempts.count(self._to(attempts, state, facts, widen))
-        running = _left_running(state, planned, facts)
+        running = left_running(state, planned, facts)
         if not running:
             return planned
         tidy = attempts.count(self._to(attempts, state, (*facts, *running)))
@@ -250,6 +252,35 @@ class PlannerReplanner:
             time.perf_counter() - attempts.start_s,
         )
 
+    def _shortened(
+        self,
+        attempts: _Attempts,
+        context: BoundaryContext,
+        state: State,
+        found: Replan,
+        rest: int,
+        wanted: Sequence[Literal],
+    ) -> Replan:
+        """The plan without pairs of steps that undo each other and that nothing asks for.
+
+        What must change still does before the old plan, its last `rest` steps, is taken up again.
+        """
+        assert found.plan is not None
+        steps, best = found.plan.subtasks, found
+        restored = _restored(state, steps, len(steps) - rest, wanted)
+
+        def accepts(shorter: tuple[Subtask, ...], own: int) -> bool:
+            nonlocal best
+            if not restored <= _restored(state, shorter, own, wanted):
+                return False
+            accepted = self._checked(attempts, context, state, shorter)
+            best = accepted or best
+            return accepted is not None
+
+        with suppress(TimeUp):  # the plan as it is will do
+            pruned(state, steps, len(steps) - rest, accepts)
+        return best
+
     def _failed(self, attempts: _Attempts, state: State, wanted: list[Literal]) -> Replan:
         hands = self.domain.robot.hands
         lost = [a for x in wanted for a in x.args if a not in hands and _is_lost(state, a)]
@@ -279,90 +310,6 @@ class PlannerReplanner:
         )
 
 
-def _hand(state: State, wanted: Sequence[Literal]) -> list[Literal]:
-    """What the hands hold, and what lies in or on that, should stay so."""
-    roles = state.domain.roles
-    if roles.holding is None or any(
-        x.predicate in (roles.holding, roles.hand_empty) for x in wanted
-    ):
-        return []
-    held = list(state.in_hands())
-    if not held:
-        return [] if roles.hand_empty is None else [Literal(roles.hand_empty, ())]
-    facts = [Literal(roles.holding, (thing, hand)) for hand, thing in held]
-    concerned = {a for x in wanted if x.predicate == roles.vacant for a in x.args}
-    for _, thing in held:
-        for name in state.contents(thing) if thing not in concerned else ():
-            place = state.place(name)
-            assert place is not None
-            facts.append(Literal(place.relation, (name, thing)))
-    return facts
-
-
-def _as_it_is(state: State, literal: Literal) -> Literal | None:
-    """A literal that holds, with category names replaced by the instances that make it hold."""
-    if unsupported((literal,), state.domain) or not state.holds(literal):
-        return None
-    if literal.value == "false":
-        return literal
-    for position, name in enumerate(literal.args):
-        if name in state.domain.robot.hands or name in state.kinds:
-            continue
-        for instance in state.matches(name):
-            ground = literal.bind({literal.args[position]: instance})
-            if state.holds(ground):
-                literal = ground
-                break
-    return literal
-
-
-def _unspoiled(state: State, goal: Goal, wanted: Sequence[Literal]) -> list[Literal]:
-    """What must not happen to what the repair handles, since the goal forbids it for good."""
-    kinds = dict(goal.variables)
-    handled = {a for x in wanted for a in x.args if a in state.kinds}
-    handled |= {h for _, h in state.in_hands()}
-    handled |= {y for x in handled for y in state.contents(x)}
-    found = []
-    for ban in dict.fromkeys(x for x in goal.never if x.predicate in state.domain.histories):
-        guarded = {kinds.get(a, category_of(a)) for a in ban.args}
-        for name in sorted(handled):
-            if state.kinds[name] in guarded and not state.holds(Literal(ban.predicate, (name,))):
-                found.append(Literal(ban.predicate, (name,), "false"))
-    return list(dict.fromkeys(found))
-
-
-def _left_running(state: State, planned: Planned, facts: Sequence[Literal]) -> list[Literal]:
-    """Devices that a repair would leave running although they did not and nothing asks for it."""
-    if planned.final is None:
-        return []
-    found = []
-    for attribute, value in _running(state.domain):
-        asked = {x.args[0] for x in facts if x.predicate == attribute}
-        default = state.domain.values(attribute)[0]
-        found += [
-            Literal(attribute, (name,), default)
-            for name in sorted(state.kinds)
-            if state.value(name, attribute) == default
-            and planned.final.value(name, attribute) == value
-            and name not in asked
-        ]
-    return found
-
-
-def _running(domain: Domain) -> list[tuple[str, str]]:
-    """Values, other than the default, that let a process go on: that a device is on."""
-    found: dict[tuple[str, str], None] = {}
-    for process in domain.processes:
-        changed = {f.args[0] for e in process.effects for f in e.facts if f.args}
-        for literal, positive in literals(process.condition):
-            known = domain.attributes.get(literal.predicate)
-            if known is None or not positive or literal.args[0] in changed:
-                continue
-            if literal.value != known.values[0]:
-                found[literal.predicate, literal.value] = None
-    return list(found)
-
-
 def _rests(
     context: BoundaryContext, state: State, repaired: bool
 ) -> tuple[tuple[Subtask, ...], ...]:
@@ -385,6 +332,14 @@ def _rests(
             bound[kind] = name
     named = tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
     return (named,) if named == rest else (named, rest)
+
+
+def _restored(
+    state: State, steps: Sequence[Subtask], count: int, wanted: Sequence[Literal]
+) -> set[Literal]:
+    """Which of some facts hold after the first steps of a plan."""
+    after = run(state, steps[:count]).final
+    return {x for x in wanted if after.holds(x)}
 
 
 def _is_lost(state: State, name: str) -> bool:

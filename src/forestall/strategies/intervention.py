@@ -94,19 +94,13 @@ class Intervention:
         if diagnosis is None:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
         if context.may_look:
-            return look_again(verdict, clock, diagnosis.cause)
+            return look_again(verdict, clock, diagnosis.cause, diagnosis)
         return self.alarm(context, verdict, diagnosis, clock)
 
     def why_not(self, context: BoundaryContext, clock: Clock) -> Diagnosis | None:
         """Why what is left of the plan would not run from what is seen, None if it would."""
         check = self.check_plan(context, clock)
-        if check.ok:
-            return None
-        return Diagnosis(
-            cause=f"what is left of the plan would not work: {check.reason}",
-            must_change=check.lacking or check.unmet,
-            producer=PLAN_CHECK,
-        )
+        return None if check.ok else would_not_work(check)
 
     def done_already(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer | None:
         """Before the first step: the goal holds on what is seen, so that nothing is left to do."""
@@ -151,15 +145,24 @@ class Intervention:
             producer=GOAL_CHECK,
         )
 
-    def refused(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer:
-        """The robot refused this very subtask, and nothing about it has changed: another way."""
+    def refused(
+        self, context: BoundaryContext, clock: Clock, lacking: tuple[Literal, ...] = ()
+    ) -> StrategyAnswer:
+        """The robot refused this very subtask, and nothing about it has changed: another way.
+
+        Args:
+            context: what is known.
+            clock: books the time.
+            lacking: what judges say must change besides.
+        """
         _, goal = self.check_goal(context, clock)
         verdict = checked(SKILL_STATUS, False, "the robot has refused this subtask before")
         diagnosis = Diagnosis(
             cause=f"the robot has refused {context.subtask}, and nothing about it has changed",
-            must_change=goal.must_change,
+            must_change=tuple(dict.fromkeys((*lacking, *goal.must_change))),
             culprits=context.subtask.args,
             producer=SKILL_STATUS,
+            step=context.subtask,
         )
         return self.alarm(context, verdict, diagnosis, clock)
 
@@ -271,10 +274,27 @@ def checked(detector: str, fine: bool, note: str) -> Verdict:
     )
 
 
-def look_again(verdict: Verdict, clock: Clock, why: str = "") -> StrategyAnswer:
+def would_not_work(check: PlanCheck) -> Diagnosis:
+    """Why what is left of a plan would not work, as a check of it says."""
+    steps = () if check.plan is None else check.plan.subtasks
+    refused = check.step is not None and check.step < len(steps)
+    return Diagnosis(
+        cause=f"what is left of the plan would not work: {check.reason}",
+        must_change=check.lacking or check.unmet,
+        producer=PLAN_CHECK,
+        step=steps[check.step] if refused and check.step is not None else None,
+        refusal=check.reason,
+    )
+
+
+def look_again(
+    verdict: Verdict, clock: Clock, why: str = "", suspected: Diagnosis | None = None
+) -> StrategyAnswer:
     """Ask for another look before anything is claimed."""
     verdict = replace(verdict, decision=Decision.LOOK_AGAIN)
-    return StrategyAnswer(Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items())
+    return StrategyAnswer(
+        Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items(), suspected=suspected
+    )
 
 
 def rest_of(context: BoundaryContext, domain: Domain) -> Plan:

@@ -18,11 +18,12 @@ from forestall.strategies.intervention import (
     Intervention,
     checked,
     look_again,
+    would_not_work,
 )
 from forestall.types.episode import SkillOutcome
 from forestall.types.facts import Literal
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
-from forestall.types.verdict import Decision, Diagnosis, PlanCheck
+from forestall.types.verdict import Decision, PlanCheck
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
 
@@ -58,18 +59,14 @@ class PlanChecking:
             return self._intervention.refused(context, clock)
         domain = self._validator.domain
         check = self._intervention.check_plan(context, clock)
-        verdict = checked(PLAN_CHECK, check.ok, _note(check))
+        verdict = checked(PLAN_CHECK, check.ok, told(check))
         if not check.ok:
-            diagnosis = Diagnosis(
-                cause=f"what is left of the plan would not work: {check.reason}",
-                must_change=check.lacking or check.unmet,
-                producer=PLAN_CHECK,
-            )
+            diagnosis = would_not_work(check)
             if context.may_look:
-                return look_again(verdict, clock, diagnosis.cause)
+                return look_again(verdict, clock, diagnosis.cause, diagnosis)
             return self._intervention.alarm(context, verdict, diagnosis, clock)
         lost = [n for n in context.subtask.args if not context.graph.matches(n)]
-        unseen = lost or [str(x) for x in _relied_on_now(check, context, domain)]
+        unseen = lost or [str(x) for x in relied_on_now(check, context, domain)]
         if unseen:
             why = f"not observed: {', '.join(unseen)}"
             found = self._intervention.look_for(context, verdict, clock)
@@ -85,7 +82,7 @@ class PlanChecking:
         return _GO_ON
 
 
-def _relied_on_now(
+def relied_on_now(
     check: PlanCheck, context: BoundaryContext, domain: Domain
 ) -> tuple[Literal, ...]:
     """Unobserved facts about the next subtask's arguments that its needs speak of.
@@ -117,7 +114,8 @@ def _spoken_of(domain: Domain, skill: str) -> set[str]:
     return found
 
 
-def _note(check: PlanCheck) -> str:
+def told(check: PlanCheck) -> str:
+    """What the plan check says, for a verdict."""
     if check.ok:
         return "what is left of the plan runs on what is seen"
     if check.step is None:

@@ -96,6 +96,7 @@ class Watch:
             diagnosis,
             seconds=clock.items(),
             watched=(verdict, *others),
+            only_watched=True,
         )
 
     def _asking(self, verdicts: Sequence[Verdict]) -> list[str]:

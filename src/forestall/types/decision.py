@@ -54,6 +54,8 @@ class MonitorDecision:
         look_at: world points to look at, for "look"; empty: all around.
         hold: the kind of reason, for "hold".
         why: the reason in words.
+        sentence: what the owner is told: what is, why it would fail, what is done; empty where a
+            step simply goes on.
         seconds: compute time by phase.
         context: what was known; None where nothing was looked at.
         record: the record of this moment; None where nothing was looked at.
@@ -70,6 +72,7 @@ class MonitorDecision:
     look_at: tuple[Vec3, ...] = ()
     hold: Hold | None = None
     why: str = ""
+    sentence: str = ""
     seconds: tuple[tuple[str, float], ...] = ()
     context: BoundaryContext | None = None
     record: BoundaryRecord | None = None

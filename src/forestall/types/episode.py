@@ -96,6 +96,7 @@ class BoundaryRecord:
     watched: tuple[Verdict, ...] = ()  # what further detectors said of the same observation
     outcome: Outcome | None = None  # what the monitor decided
     compute_s: tuple[tuple[str, float], ...] = ()
+    sentence: str = ""  # what the owner is told
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,4 +82,6 @@ class StrategyAnswer:
     replan: Replan | None = None
     why: str = ""
     seconds: tuple[tuple[str, float], ...] = ()  # compute by phase: retrieve, compare, ...
-    watched: tuple[Verdict, ...] = ()  # what further detectors said of the same observation
+    watched: tuple[Verdict, ...] = ()  # what every judge said of the same observation
+    suspected: Diagnosis | None = None  # what another look is to make sure of
+    only_watched: bool = False  # nothing is ever interrupted

@@ -172,7 +172,10 @@ class Diagnosis:
     """Why the scene does not fit, and what must change.
 
     `must_change` are ground literals that should hold and do not; `must_stay` hold and should be
-    kept. An empty `must_change` means: nothing was found that must change.
+    kept. An empty `must_change` means: nothing was found that must change. Where what is left of
+    the plan was checked, `step` is its step that would be refused, None where all would run, and
+    `refusal` says what is lacking; without a refusal `step` was tried. Where the evidence is
+    demonstrations, the fact that weighs most held in the first number of `support` of the second.
     """
 
     cause: str
@@ -180,6 +183,9 @@ class Diagnosis:
     must_stay: tuple[Literal, ...] = ()
     culprits: tuple[str, ...] = ()  # ids of the objects that the cause speaks about
     producer: str = ""
+    step: Subtask | None = None
+    refusal: str = ""
+    support: tuple[int, int] | None = None
 
 
 class ReplanOutcome(Enum):
