@@ -50,7 +50,6 @@ def main() -> None:
         text = document.read_text(encoding="utf-8")
         if (new := filled(text)) != text:
             document.write_text(new, encoding="utf-8")
-            print(document.relative_to(ROOT))
 
 
 if __name__ == "__main__":
