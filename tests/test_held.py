@@ -138,7 +138,7 @@ def test_alarms_in_a_row_hold_where_each_would_be_let_pass() -> None:
 
 
 def test_alarms_of_who_only_watches_hold_nothing() -> None:
-    alarm = replace(GO, verdict=ALARM, watched=(ALARM, ALARM))
+    alarm = replace(GO, verdict=ALARM, watched=(ALARM, ALARM), only_watched=True)
     limits = Limits(max_alarms_in_a_row=1)
     monitor, _ = started(alarm, alarm, alarm, on_alarm="proceed", limits=limits)
     monitor.start(type(PLAN)(PLAN.subtasks * 2))

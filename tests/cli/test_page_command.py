@@ -57,7 +57,7 @@ def test_a_picture_that_is_gone_is_missing_and_one_that_is_broken_is_told(
     ("text", "says"),
     [
         ("", "is empty"),
-        (json.dumps({"kind": "episode", "format": 1}), "record format 1: this version reads 2"),
+        (json.dumps({"kind": "episode", "format": 1}), "record format 1: this version reads 3"),
     ],
 )
 def test_no_page_without_a_record(

@@ -281,10 +281,10 @@ def test_skills_are_those_of_the_domain_where_that_can_be_known(tmp_path: Path) 
     ("text", "says"),
     [
         ("[" * 100_000, "nests too deeply"),
-        ('{"kind": "episode", "format": 2, "x": ' + "[" * 90 + "]" * 90 + "}", "nests more than"),
+        ('{"kind": "episode", "format": 3, "x": ' + "[" * 90 + "]" * 90 + "}", "nests more than"),
         ('{"kind": "episode", "format": NaN}', "no number"),
         ('{"kind": "episode", "format": ' + "9" * 5000 + "}", "64 bit"),
-        ('{"kind": "episode", "format": 2, "task": "\\ud800"}', "half of a character"),
+        ('{"kind": "episode", "format": 3, "task": "\\ud800"}', "half of a character"),
     ],
 )
 def test_json_that_no_record_is(tmp_path: Path, text: str, says: str) -> None:
