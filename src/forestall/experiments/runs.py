@@ -134,15 +134,7 @@ class Run:
     @property
     def setup(self) -> Setup:
         """Who watches over it, and what he knows."""
-        return Setup(
-            self.strategy,
-            self.detector,
-            self.threshold,
-            self.without,
-            self.profile,
-            self.model,
-            self.demonstrations,
-        )
+        return Setup.of(self)
 
     @property
     def key(self) -> str:

@@ -7,7 +7,7 @@ Written by the experiments, read by metrics, tables, figures and pages. Truth ab
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from typing import Any, ClassVar
 
@@ -54,6 +54,11 @@ class Setup:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+
+    @classmethod
+    def of(cls, run: Any) -> Setup:
+        """That of a run or a row, which has its fields among others."""
+        return cls(*(getattr(run, field.name) for field in fields(cls)))
 
     def key(self, case: Case) -> str:
         """The key of an episode: readable, unique within an experiment, fit for a folder's name."""
@@ -207,15 +212,7 @@ class EpisodeRow:
     @property
     def setup(self) -> Setup:
         """Who watched over it."""
-        return Setup(
-            self.strategy,
-            self.detector,
-            self.threshold,
-            self.without,
-            self.profile,
-            self.model,
-            self.demonstrations,
-        )
+        return Setup.of(self)
 
     @property
     def failing(self) -> bool:
