@@ -39,15 +39,16 @@ def test_the_primary_judge_looks_again_whenever_it_wants() -> None:
     assert again.verdict is not None and again.verdict.decision is Decision.REPLAN
 
 
-def test_every_other_judge_has_a_few_looks_in_a_run() -> None:
+def test_every_other_judge_looks_again_until_an_alarm_of_its_stands() -> None:
     unsure, sure = named("b", Decision.LOOK_AGAIN), named("a", Decision.PROCEED)
-    watch = Watch(sure, sure, [DetectorJudge(unsure)], sure, looks_each=2)
+    watch = Watch(sure, sure, [DetectorJudge(unsure)], sure)
     asked = [watch.before_subtask(boundary(index=k)).decision for k in range(3)]
-    assert asked == [Decision.LOOK_AGAIN, Decision.LOOK_AGAIN, Decision.PROCEED]
-    assert watch.before_subtask(boundary(index=0)).decision is Decision.LOOK_AGAIN, "a new run"
-    last = watch.before_subtask(boundary(looks=2, may_look=False))
+    assert asked == [Decision.LOOK_AGAIN] * 3
+    last = watch.before_subtask(boundary(index=2, looks=2, may_look=False))
     assert last.decision is Decision.PROCEED
     assert last.diagnosis is None
+    assert watch.before_subtask(boundary(index=3)).decision is Decision.PROCEED, "it stands"
+    assert watch.before_subtask(boundary(index=0)).decision is Decision.LOOK_AGAIN, "a new run"
 
 
 def test_judges_must_be_told_apart() -> None:

@@ -66,7 +66,6 @@ _NO_FLOOR = 0.01
 _SCORE = "score"
 """How the paper's detector is called among judges."""
 
-_WATCH = signature(Watch).parameters["looks_each"].default
 
 _PROACTIVE, _POST_HOC, _ONLINE, _PLAN_CHECK = (
     signature(strategy).parameters["max_attempts"].default
@@ -300,7 +299,6 @@ def watch(
     models: tuple[str, ...] = (Distortion.EXACT.value,),
     model_seed: int = 0,
     counts: tuple[int, ...] = (),
-    looks_each: int = _WATCH,
 ) -> Watch:
     """Every detector, every ablation of the score and the plan check judge, the paper's own first.
 
@@ -310,7 +308,6 @@ def watch(
         model_seed: of what a wrong model has wrong.
         counts: the score and the preconditions judge with so many of the demonstrations, too, the
             first ones by seed.
-        looks_each: see `strategies.watch`.
     """
     paper = SceneGraphDetector.name
     primary = parts.part(DETECTOR, paper, **_shared(parts, paper, calibrated=True))
@@ -329,7 +326,7 @@ def watch(
         *(_with_model(parts, model, model_seed) for model in models),
         *(j for n in sorted(set(counts)) for j in _with_few(parts, n)),
     ]
-    return Watch(parts.part(RETRIEVER), primary, judges, parts.part(REASONER), looks_each)
+    return Watch(parts.part(RETRIEVER), primary, judges, parts.part(REASONER))
 
 
 def whole_scene(parts: Parts) -> WholeSceneJudge:

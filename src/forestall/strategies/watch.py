@@ -27,15 +27,16 @@ class Watch:
     """Judges each subtask before it starts, and lets it start.
 
     The detector is the primary judge: it asks for another look whenever it wants one, and its alarm
-    is diagnosed and stays in the record as an alarm that nothing came of. Every other judge can
-    have a few looks of its own in a run; all of them judge what is seen then.
+    is diagnosed and stays in the record as an alarm that nothing came of. Every other judge has
+    another look, too, before its first alarm of a run stands: that alarm tells whether the run was
+    in time or falsely alarmed. Later ones come at the first look, as one who has alarmed would look
+    again at every subtask that is left. All judge what is seen then.
 
     Args:
         retriever: finds the references, the same for all that bring none of their own.
         detector: the primary judge.
         judges: the others; their names tell them apart.
         reasoner: explains the primary one's alarms.
-        looks_each: before how many subtasks of a run each of the others may ask for another look.
 
     Raises:
         InputError: two of the same name.
@@ -50,7 +51,6 @@ class Watch:
         detector: Detector,
         judges: Sequence[Judge],
         reasoner: Reasoner,
-        looks_each: int = 0,
     ) -> None:
         names = [detector.name, *(j.name for j in judges)]
         twice = sorted(n for n, count in Counter(names).items() if count > 1)
@@ -60,13 +60,12 @@ class Watch:
         self._primary = AskedDetector(detector)
         self._judges = tuple(judges)
         self._reasoner = AskedReasoner(reasoner)
-        self._looks_each = looks_each
-        self._asked: Counter[str] = Counter()
+        self._settled: set[str] = set()
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Let every judge judge; on an alarm of the primary one, diagnose; go on."""
         if context.index == 0 and context.looks == 1:
-            self._asked.clear()
+            self._settled.clear()
         clock = Clock()
         references = tuple(
             self._retriever.retrieve(context.subtask, context.task.name, context.done)
@@ -82,10 +81,10 @@ class Watch:
         others = [judge.judge(context) for judge in self._judges]
         clock.lap("watch")
         if context.may_look and (asking := self._asking(others)):
-            self._asked.update(asking)
             wanted = replace(verdict, decision=Decision.LOOK_AGAIN)
             why = f"another look for {', '.join(asking)}"
             return StrategyAnswer(Decision.LOOK_AGAIN, wanted, why=why, seconds=clock.items())
+        self._settled.update(v.detector for v in others if v.decision is not Decision.PROCEED)
         diagnosis = None
         if verdict.decision is Decision.REPLAN:
             diagnosis = self._reasoner.diagnose(context, verdict)
@@ -100,11 +99,11 @@ class Watch:
         )
 
     def _asking(self, verdicts: Sequence[Verdict]) -> list[str]:
-        """Judges that want another look and have not had theirs."""
+        """Judges that want another look, and of which no alarm stands."""
         return [
             v.detector
             for v in verdicts
-            if v.decision is Decision.LOOK_AGAIN and self._asked[v.detector] < self._looks_each
+            if v.decision is Decision.LOOK_AGAIN and v.detector not in self._settled
         ]
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
