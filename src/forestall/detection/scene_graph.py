@@ -18,6 +18,7 @@ from forestall.types.verdict import (
     Reference,
     Verdict,
     demonstrations_of,
+    scenes,
 )
 
 NO_REFERENCE = "no reference above the floor: nothing to compare with, so nothing was judged"
@@ -76,6 +77,7 @@ class SceneGraphDetector:
     ) -> Verdict:
         """Compare the scoped graph of a boundary with every reference."""
         config = self._config
+        references = scenes(references)
         able = [r for r in references if not unseen_by(r, observed)]
         best = self._scorer.best(observed, able)
         if best is None or best.score is None:
