@@ -14,9 +14,9 @@ from typing import Annotated, Any, TypeVar
 
 from forestall.assembly.configuration import SWITCHES
 from forestall.assembly.seeing import look_encoder
-from forestall.comparison.options import Feature, ScoreConfig
 from forestall.comparison.lacking import Knowledge
 from forestall.comparison.needs import Needs, needs_of
+from forestall.comparison.options import Feature, ScoreConfig
 from forestall.comparison.preconditions import MiningConfig, mine, needed, violations
 from forestall.comparison.score import BatchScorer
 from forestall.detection.caption import CaptionDetector

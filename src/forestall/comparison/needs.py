@@ -1,7 +1,7 @@
-"""What held before skills, counted: over arguments and not names, over every task, one run at a time.
+"""What held before skills, counted over arguments and not names, in every task, run by run.
 
-Called by `preconditions`, which mines from it; calls lifting and tally. Adding a run asks about that
-run alone, so that it costs the same in a memory of any size. Counted are, by demonstrations:
+Called by `preconditions`, which mines from it; calls lifting and tally. Adding a run asks about
+that run alone, so that it costs the same in a memory of any size. Counted are, by demonstrations:
 
 - before each skill, for each fact about its arguments, by the kinds of the arguments that it is
   about and by task, which values it had;

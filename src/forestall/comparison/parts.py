@@ -58,7 +58,7 @@ def applies(slot: Slot, kinds: Kinds, domain: Domain) -> bool:
     if known.kind is PredicateKind.ATTRIBUTE:
         return all(c is not None and predicate in c.attributes for c in categories)
     wanted = {roles.vacant: roles.vacatable, roles.accessible: roles.movable}
-    wanted |= {roles.unblocked: roles.movable, roles.holding: roles.movable}
+    wanted[roles.holding] = roles.movable
     if predicate in wanted:
         return all(domain.is_a(k, wanted[predicate]) for k in kinds)
     if known.offered_by and len(args) > 1 and args[1] in of:

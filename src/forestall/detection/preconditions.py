@@ -213,10 +213,7 @@ def weight(violation: Violation) -> float:
 
 
 def _listed(what: str, found: Sequence[Violation]) -> str:
-    texts = [
-        f"{v.literal} ({_evidence(v)})"
-        for v in found[:_TOLD]
-    ]
+    texts = [f"{v.literal} ({_evidence(v)})" for v in found[:_TOLD]]
     more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return f"{what}: {', '.join(texts)}{more}"
 

@@ -123,9 +123,7 @@ class SymbolicReasoner:
     ) -> tuple[Sequence[Precondition], Sequence[Violation]]:
         """What the references show, and what of it is not so."""
         subtask, graph = context.subtask, context.graph
-        mined = self.mine(
-            context.references, self.domain, subtask=subtask, task=context.task.name
-        )
+        mined = self.mine(context.references, self.domain, subtask=subtask, task=context.task.name)
         return mined, [
             v
             for v in self.violations(mined, graph, subtask, self.domain)

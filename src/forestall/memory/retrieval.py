@@ -160,7 +160,9 @@ class EmbeddingRetriever:
         own = _kinds(subtask.args, self._domain)
         groups = [
             (self._shared(own, kinds), elsewhere == task, elsewhere, kinds, entries)
-            for (kinds, elsewhere), entries in self._sorts.get(self._domain.family(subtask), {}).items()
+            for (kinds, elsewhere), entries in self._sorts.get(
+                self._domain.family(subtask), {}
+            ).items()
             if len(kinds) == len(own)
         ]
         ranked = sorted(groups, key=lambda g: (-g[0], *g[1:4]))

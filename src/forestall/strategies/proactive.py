@@ -74,9 +74,7 @@ class Proactive:
         )
         clock.lap("retrieve")
         context = replace(context, references=references)
-        verdict = self._detector.judge(
-            context.scoped, context.observation, references, context
-        )
+        verdict = self._detector.judge(context.scoped, context.observation, references, context)
         clock.lap("compare")
         if verdict.decision is Decision.LOOK_AGAIN and context.may_look:
             return StrategyAnswer(Decision.LOOK_AGAIN, verdict, seconds=clock.items())
