@@ -14,6 +14,7 @@ from forestall.memory.store import open_store
 from forestall.types.demonstration import Demonstration, View
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
+from forestall.types.verdict import Reach, scenes
 
 DOMAIN = shipped("household")
 COFFEE = (
@@ -46,7 +47,7 @@ def retriever(**options: float) -> EmbeddingRetriever:
 
 def order(subtask: str, task: str, done: int, **options: float) -> list[tuple[str, int]]:
     found = retriever(**options).retrieve(Subtask.parse(subtask), task, done)
-    return [(r.demonstration, r.index) for r in found]
+    return [(r.demonstration, r.index) for r in scenes(found)]
 
 
 def test_the_same_step_of_the_same_task_comes_first() -> None:
@@ -64,9 +65,20 @@ def test_the_same_step_of_the_same_task_comes_first() -> None:
 def test_less_similar_steps_come_later_with_their_similarity() -> None:
     found = retriever(floor=0.5).retrieve(Subtask.parse("pick_up(Mug-1)"), "make-coffee", 1)
     assert [r.similarity for r in found[:5]] == [1.0] * 5
-    assert found[-1].demonstration == "s"
+    assert found[-1].demonstration == "s" and found[-1].reach is Reach.SCENE
     assert 0.5 <= found[-1].similarity < 0.8
     assert "s" not in {name for name, _ in order("pick_up(Mug-1)", "make-coffee", 1)}
+
+
+def test_the_same_skill_on_other_things_says_what_it_needs_and_no_more() -> None:
+    found = retriever().retrieve(Subtask.parse("pick_up(Cup-1)"), "toast-bread", 0)
+    assert {r.reach for r in found} == {Reach.ROLE}
+    assert str(found[0].subtask).startswith("pick_up(Mug"), "what is most like a cup comes first"
+    assert {r.demonstration for r in found} == {"w", "c1", "c2", "s"}
+    assert len(retriever(roles=2).retrieve(Subtask.parse("pick_up(Cup-1)"), "t", 0)) == 2
+    assert not retriever(roles=0).retrieve(Subtask.parse("pick_up(Cup-1)"), "toast-bread", 0)
+    with pytest.raises(InputError, match="roles"):
+        RetrievalConfig(roles=-1)
 
 
 def test_k_and_steps_per_demonstration() -> None:
@@ -86,7 +98,8 @@ def test_only_the_same_skill_unless_asked() -> None:
 
 
 def test_put_on_and_put_in_are_one_skill() -> None:
-    found = retriever().retrieve(Subtask.parse("put_on(Mug-1, CoffeeMachine-1)"), "make-coffee", 4)
+    put = Subtask.parse("put_on(Mug-1, CoffeeMachine-1)")
+    found = scenes(retriever().retrieve(put, "make-coffee", 4))
     assert [(r.index, r.similarity) for r in found] == [(4, 1.0), (4, 1.0)]
 
 

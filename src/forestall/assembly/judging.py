@@ -6,7 +6,7 @@ replanning, planning, strategies.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
@@ -17,8 +17,10 @@ from forestall.assembly.calibrated import calibrated
 from forestall.assembly.configuration import SWITCHES
 from forestall.assembly.corrections import corrections_of
 from forestall.assembly.seeing import look_encoder
+from forestall.comparison.lacking import Knowledge
+from forestall.comparison.needs import Needs, needs_of
 from forestall.comparison.options import Feature, ScoreConfig
-from forestall.comparison.preconditions import MiningConfig, mine, violations
+from forestall.comparison.preconditions import MiningConfig, mine, needed, violations
 from forestall.comparison.score import BatchScorer
 from forestall.detection.caption import CaptionDetector
 from forestall.detection.image import ImageDetector
@@ -44,6 +46,7 @@ from forestall.memory.retrieval import EmbeddingRetriever, RetrievalConfig
 from forestall.memory.store import SqliteStore, open_store
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
+from forestall.planning.ahead import foresee
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.anew import GoalReplanner
@@ -56,6 +59,7 @@ from forestall.strategies.plan_check import PlanChecking
 from forestall.strategies.post_hoc import PostHoc
 from forestall.strategies.proactive import Proactive
 from forestall.strategies.watch import Watch
+from forestall.types.demonstration import Demonstration
 from forestall.types.kind import Settled
 
 S = TypeVar("S")
@@ -167,8 +171,23 @@ def always_held(
     used = (alarm or PreconditionConfig(), mining or MiningConfig())
     thresholds = calibrated(parts, calibration, PreconditionDetector.name, *used)
     return PreconditionDetector(
-        parts.domain, mining, alarm, thresholds, corrections_of(parts, corrections)
+        parts.domain,
+        mining,
+        alarm,
+        thresholds,
+        corrections_of(parts, corrections),
+        knowledge=_knowledge(parts),
     )
+
+
+def _knowledge(parts: Parts, demonstrations: Sequence[Demonstration] | None = None) -> Knowledge:
+    """The counts of the run's memory, or of some demonstrations, and who executes plans."""
+    domain = parts.domain
+
+    def counts() -> Needs:
+        return needs_of(parts.demonstrations if demonstrations is None else demonstrations, domain)
+
+    return Knowledge(counts, foresee)
 
 
 def caption(parts: Parts, *, alarm: DetectorConfig | None = None) -> CaptionDetector:
@@ -180,8 +199,14 @@ def preconditions(
     parts: Parts, *, mining: MiningConfig | None = None, corrections: str | None = None
 ) -> SymbolicReasoner:
     """What always held before the subtask and does not now; options as `always_held`."""
-    layer = corrections_of(parts, corrections)
-    return SymbolicReasoner(partial(mine, config=mining), violations, parts.domain, layer)
+    return SymbolicReasoner(
+        partial(mine, config=mining),
+        violations,
+        parts.domain,
+        corrections_of(parts, corrections),
+        knowledge=_knowledge(parts),
+        remembered=partial(needed, config=mining),
+    )
 
 
 def no_reasoning(parts: Parts) -> NoReasoning:
@@ -365,12 +390,13 @@ def _with_few(parts: Parts, count: int) -> list[DetectorJudge]:
     first = sorted(parts.demonstrations, key=lambda d: (d.seed, d.id))[:count]
     retriever = EmbeddingRetriever(first, parts.part(TEXT_ENCODER), parts.domain)
     told = f"{count} demonstration{'s' if count > 1 else ''}"
-    return [
-        DetectorJudge(
-            parts.part(DETECTOR, name, **_shared(parts, name)), retriever, f"{name}, {told}"
-        )
-        for name in (SceneGraphDetector.name, PreconditionDetector.name)
-    ]
+    found = []
+    for name in (SceneGraphDetector.name, PreconditionDetector.name):
+        detector = parts.part(DETECTOR, name, **_shared(parts, name))
+        if isinstance(detector, PreconditionDetector):
+            detector = detector.knowing(_knowledge(parts, first))
+        found.append(DetectorJudge(detector, retriever, f"{name}, {told}"))
+    return found
 
 
 def _shared(parts: Parts, name: str, calibrated: bool = False) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Facts about a subtask's arguments as literals over the skill's parameters.
 
-Called by preconditions; calls nothing. A literal is true, false, or unobserved in a graph; `lift`
-collects the true ones, the negative ones included.
+Called by preconditions and needs; calls nothing. A literal is true, false, or unobserved in a
+graph; `lift` collects the true ones, the negative ones included.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
     - states of the arguments: dirty(?object)=clean, open(?target)=open, ... (before driving
       somewhere not whether that is open or on: it makes no difference to driving);
     - vacant(?x) for receptacles with a capacity and for vessels;
-    - accessible(?x) for what can be picked up; unblocked(?x) for what of it the skill needs clear;
+    - accessible(?x) for what can be picked up; unblocked(?x) for what the skill needs clear;
     - held_by(?x, gripper), hand_empty(), and held_by(Lettuce, gripper) for what is no argument;
     - the relations between two arguments that skills are about: inside(?object, ?target) or not;
     - every other derived fact about one argument, or about none, that the domain wants mined;
@@ -41,15 +41,21 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
 
     An argument that is a category name and no node of the graph has no true literal.
     """
+    found = candidates(graph, subtask, domain)
+    return frozenset(c for c in found if evaluate(c, graph, subtask, domain) is Truth.TRUE)
+
+
+def candidates(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Literal]:
+    """What `lift` would find true or not; of what is open-ended only what is there."""
     roles, known = domain.bound(subtask), domain.roles
     skill = domain.skill(subtask.skill)
-    candidates = {Literal(known.hand_empty, ())} if known.hand_empty else set()
+    found = {Literal(known.hand_empty, ())} if known.hand_empty else set()
     for variable, name in roles.items():
         node = graph.get(name)
         category = domain.find(name if node is None else node.category)
         if node is None or category is None:
             continue
-        candidates |= {
+        found |= {
             Literal(attribute, (variable,), value)
             for attribute, value in node.states
             if value is not None
@@ -57,18 +63,20 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
             and not (skill.drives and domain.attributes[attribute].mechanical)
         }
         if known.vacant and known.vacatable in category.tags:
-            candidates.add(Literal(known.vacant, (variable,)))
+            found.add(Literal(known.vacant, (variable,)))
         if known.movable in category.tags:
-            candidates |= _about_movable(variable, skill, domain)
+            found |= _about_movable(variable, domain)
+        if known.unblocked and _asks_for_way(variable, skill, domain):
+            found.add(Literal(known.unblocked, (variable,)))
         if not domain.is_open_support(category.name) and domain.offers(category.name):
-            candidates |= _contents(graph, node.id, variable, roles, domain)
-    candidates |= _between(roles, graph, domain) | _derived(tuple(roles), domain)
+            found |= _contents(graph, node.id, variable, roles, domain)
+    found |= _between(roles, graph, domain) | _derived(tuple(roles), domain)
     held = graph.holding
     if held is not None and known.holding and held not in roles.values():
         node = graph.get(held)
         category_name = category_of(held) if node is None else node.category
-        candidates.add(Literal(known.holding, (category_name, GRIPPER)))
-    return frozenset(c for c in candidates if evaluate(c, graph, subtask, domain) is Truth.TRUE)
+        found.add(Literal(known.holding, (category_name, GRIPPER)))
+    return frozenset(found)
 
 
 def _between(roles: Mapping[str, str], graph: SceneGraph, domain: Domain) -> set[Literal]:
@@ -102,7 +110,7 @@ def _derived(variables: tuple[str, ...], domain: Domain) -> set[Literal]:
     return found
 
 
-def _about_movable(variable: str, skill: Skill, domain: Domain) -> set[Literal]:
+def _about_movable(variable: str, domain: Domain) -> set[Literal]:
     """What can matter about a thing that a hand can take."""
     roles, found = domain.roles, set()
     if roles.accessible:
@@ -110,8 +118,6 @@ def _about_movable(variable: str, skill: Skill, domain: Domain) -> set[Literal]:
     if roles.holding:
         for value in ("true", "false"):
             found.add(Literal(roles.holding, (variable, GRIPPER), value))
-    if roles.unblocked and _asks_for_way(variable, skill, domain):
-        found.add(Literal(roles.unblocked, (variable,)))
     return found
 
 

@@ -1,23 +1,37 @@
 """Preconditions mined from demonstrations: what held before a skill, and what of it does not now.
 
-Called by the reasoner (through the functions that it is given); calls lifting. The simplest form of
-mining: a literal that held in every retrieved demonstration and was false in none.
+Called by the detector and the reasoner; calls needs, which counts, and tally, which weighs. Needs
+transfer: a fact about the skill's arguments is mined from every task, and from every kind of thing
+that plays the same part, as far as nothing narrower speaks against it. The rest of the scene is
+mined from the same step of the same task alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from forestall.comparison.lifting import Kind, evaluate, kind_of, lift
+from forestall.comparison.needs import (
+    Kinds,
+    Moment,
+    Needs,
+    Slot,
+    literal_of,
+    variables_of,
+)
+from forestall.comparison.parts import applies, same_part, spoken_of
+from forestall.comparison.tally import Tally, weight
 from forestall.domain.model import Domain
 from forestall.errors import InputError
-from forestall.types.facts import Literal, Truth, category_of
+from forestall.types.facts import Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-from forestall.types.verdict import Precondition, Reference, Violation
+from forestall.types.verdict import Precondition, Reference, Specificity, Support, Violation
 
-__all__ = ["MiningConfig", "lift", "mine", "violations"]
+__all__ = ["MiningConfig", "lift", "mine", "needed", "violations"]
+
+_EVEN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +42,20 @@ class MiningConfig:
         minimum_support: demonstrations in which the literal must have held; all of them, where
             there are fewer. One is enough to raise an alarm, whose cause says that it is one.
         contextual_support: the same for a literal about what is not an argument of the subtask.
+        foreign_weight: least weight of what was never seen for these kinds of things, or, if it
+            decides over a task's outcome only, never in this task; what the skill's schema speaks
+            of needs no more than that the demonstrations of others do not speak against it.
     """
 
     minimum_support: int = 2
     contextual_support: int = 3
+    foreign_weight: float = 0.75
 
     def __post_init__(self) -> None:
         if self.minimum_support < 1 or self.contextual_support < 1:
             raise InputError("a precondition needs the support of at least one demonstration")
+        if not 0 <= self.foreign_weight <= 1:
+            raise InputError(f"foreign_weight {self.foreign_weight} is not between 0 and 1")
 
 
 def mine(
@@ -46,14 +66,7 @@ def mine(
     subtask: Subtask | None = None,
     task: str | None = None,
 ) -> tuple[Precondition, ...]:
-    """Literals that held in all references of a skill with the same kinds of arguments.
-
-    Where fewer than `minimum_support` demonstrations have the same kinds of arguments, all
-    references of the skill are used, but only for literals that follow from the skill itself.
-    Literals of the material are mined from the task at hand alone:
-    that a thing was clean before one task says nothing about moving it out of the way. So are
-    literals about what is no argument of the subtask; their support must come from one step.
-    What was not observed in a demonstration counts neither for nor against a literal.
+    """Preconditions of a subtask from retrieved references alone; see `needed`.
 
     Args:
         references: as retrieved, best first.
@@ -63,41 +76,56 @@ def mine(
         task: name of the task at hand; that of the best reference by default.
 
     Returns:
-        Preconditions, the best supported first; `support` and `total` count demonstrations, also
-        where several steps of one were retrieved.
+        Preconditions, the heaviest first; `support` and `total` count demonstrations, also where
+        several steps of one were retrieved.
     """
-    config = config or MiningConfig()
     if not references:
         return ()
     subtask = subtask or references[0].subtask
     task = task if task is not None else references[0].task
-    skill = [r for r in references if domain.family(r.subtask) == domain.family(subtask)]
-    kinds = _kinds(subtask, domain)
-    same = [r for r in skill if _kinds(r.subtask, domain) == kinds]
-    alike = len(_runs(same)) >= min(config.minimum_support, len(_runs(skill)))
-    group = same if alike else skill
-    step = next((r.index for r in group if r.task == task), None)
-    candidates: set[Literal] = set()
-    for r in group:
-        candidates |= lift(r.graph, r.subtask, domain)
-    found = []
-    for literal in sorted(candidates):
-        kind = kind_of(literal, domain, domain.skills.get(subtask.skill))
-        if not alike and kind is not Kind.SKILL:
-            continue
-        asked = group if kind is Kind.SKILL else [r for r in group if r.task == task]
-        truths = [evaluate(literal, r.graph, r.subtask, domain) for r in asked]
-        if Truth.FALSE in truths:
-            continue
-        true = [r for t, r in zip(truths, asked, strict=True) if t is Truth.TRUE]
-        counted = [r for r in true if kind is not Kind.CONTEXT or r.index == step]
-        needed = min(config.minimum_support, len(_runs(asked)))
-        if kind is Kind.CONTEXT:
-            needed = config.contextual_support
-        if true and len(_runs(counted)) >= needed:
-            support, total = len(_runs(true)), len(_runs(asked))
-            found.append(Precondition(subtask.skill, literal, support, total, support / total))
-    return tuple(sorted(found, key=lambda p: (-p.weight, p.literal)))
+    family = domain.family(subtask)
+    runs: dict[str, list[Moment]] = {}
+    for r in references:
+        if domain.family(r.subtask) == family:
+            moment = Moment(r.task, r.index, r.subtask, r.graph, r.graph, r.after)
+            runs.setdefault(r.demonstration, []).append(moment)
+    counts = Needs(domain)
+    for moments in runs.values():
+        counts.add(moments)
+    step = next((m.index for r in runs.values() for m in r if m.task == task), None)
+    return needed(counts, subtask, task, step, config)
+
+
+def needed(
+    counts: Needs,
+    subtask: Subtask,
+    task: str | None,
+    step: int | None,
+    config: MiningConfig | None = None,
+) -> tuple[Precondition, ...]:
+    """Preconditions of a subtask from the counts of a memory.
+
+    A fact about arguments that decides whether the skill can run is asked of all tasks. It is kept
+    at the widest level that adds to its weight: the same kinds of things, or all that play the same
+    part. One that is of the matter (a thing was clean) is asked of the task at hand; it goes beyond
+    only where the skill's schema speaks of it, or where it held in several tasks and varied
+    elsewhere: that a thing was clean before one task says nothing about moving it out of the way.
+
+    Args:
+        counts: of the memory.
+        subtask: the subtask at hand.
+        task: name of the task at hand, None where it is not known.
+        step: index of the demonstrated step that what is about no argument is asked of.
+        config: how much evidence is needed.
+
+    Returns:
+        Preconditions, the heaviest first.
+    """
+    config = config or MiningConfig()
+    found = [*_of_arguments(counts, subtask, task, config)]
+    if task is not None and step is not None:
+        found += _of_the_rest(counts, subtask, task, step, config)
+    return tuple(sorted(found, key=lambda p: (-round(p.weight, 6), p.literal)))
 
 
 def violations(
@@ -123,9 +151,137 @@ def violations(
     )
 
 
-def _runs(references: Sequence[Reference]) -> set[str]:
-    return {r.demonstration for r in references}
+def _of_arguments(
+    counts: Needs, subtask: Subtask, task: str | None, config: MiningConfig
+) -> Iterator[Precondition]:
+    domain = counts.domain
+    family, kinds = domain.family(subtask), counts.kinds(subtask)
+    for slot in counts.before.get(family, {}):
+        own = tuple(kinds[v] for v in variables_of(slot) if v in kinds)
+        if len(own) == len(variables_of(slot)):
+            asked = _Asked(counts, subtask, task, slot, own, config)
+            for value in sorted(counts.forms[family][slot]):
+                if (kept := asked.kept(value)) is not None:
+                    yield kept
 
 
-def _kinds(subtask: Subtask, domain: Domain) -> tuple[str, ...]:
-    return tuple(category_of(domain.canonical(a)) for a in subtask.args)
+class _Asked:
+    """One fact about the arguments of one subtask, with what was counted at each level."""
+
+    def __init__(
+        self,
+        counts: Needs,
+        subtask: Subtask,
+        task: str | None,
+        slot: Slot,
+        own: Kinds,
+        config: MiningConfig,
+    ) -> None:
+        self._domain, self._config = counts.domain, config
+        self._subtask, self._slot, self._own = subtask, slot, own
+        family = self._domain.family(subtask)
+        by_kinds = counts.before[family][slot]
+        uses = counts.uses[family, variables_of(slot)]
+        parts = [k for k in by_kinds if same_part(counts, subtask, slot, own, k)]
+        mine = by_kinds.get(own, {})
+        self._tasks = len(mine)
+        self._tallies = {
+            Specificity.TASK: mine.get(task, Tally()) if task is not None else Tally(),
+            Specificity.CATEGORY: _total(mine.values()),
+            Specificity.PART: _total(t for k in parts for t in by_kinds[k].values()),
+        }
+        self._uses = {
+            Specificity.TASK: uses.get(own, {}).get(task or "", 0),
+            Specificity.CATEGORY: sum(uses.get(own, {}).values()),
+            Specificity.PART: sum(n for k in parts for n in uses.get(k, {}).values()),
+        }
+        near = counts.elsewhere(family, slot, own)
+        self._elsewhere = {
+            Specificity.TASK: near,
+            Specificity.CATEGORY: near,
+            Specificity.PART: _total(counts.elsewhere(family, slot, k) for k in parts),
+        }
+
+    def kept(self, value: str) -> Precondition | None:
+        """The fact as a precondition at the level where it weighs most, None where it is none."""
+        literal = literal_of(self._slot, value)
+        skill = self._domain.skills[self._subtask.skill]
+        kind = kind_of(literal, self._domain, skill)
+        said = spoken_of(literal, skill)
+        levels = self._levels(kind, value, said)
+        if not levels:
+            return None
+        weights = {level: self._weight(level, value) for level in levels}
+        if weights[levels[0]] <= _EVEN:
+            return None  # the narrowest speaks against it
+        best = max(levels, key=lambda x: (round(weights[x], 6), -levels.index(x)))
+        true, most = self._tallies[best].always(value), self._uses[best]
+        if true < max(1, min(self._config.minimum_support, most)):
+            return None
+        if self._foreign(kind) and not self._carries(best, weights[best], value, said):
+            return None
+        return Precondition(
+            self._subtask.skill,
+            literal,
+            true,
+            most,
+            weights[best],
+            best,
+            tuple(Support(x, t.always(value), t.seen) for x, t in self._tallies.items()),
+            self._elsewhere[best].ever(value),
+        )
+
+    def _levels(self, kind: Kind, value: str, said: bool) -> list[Specificity]:
+        """Levels that have a say and were observed, the narrowest first."""
+        wide = [Specificity.CATEGORY, Specificity.PART]
+        if kind is Kind.MATERIAL:
+            varied = self._elsewhere[Specificity.CATEGORY].ever(value)[1] > 0
+            several = self._tasks > 1 and varied
+            wide = [Specificity.TASK, *(wide if said or several else ())]
+        return [x for x in wide if self._tallies[x].seen]
+
+    def _foreign(self, kind: Kind) -> bool:
+        """Whether nothing of the kind was seen of what is at hand itself."""
+        near = Specificity.TASK if kind is Kind.MATERIAL else Specificity.CATEGORY
+        return not self._tallies[near].seen
+
+    def _carries(self, level: Specificity, weighs: float, value: str, said: bool) -> bool:
+        """Whether what was seen of others is enough to be asked of this."""
+        varied = self._elsewhere[level].ever(value)[1] > 0
+        enough = said or (varied and weighs >= self._config.foreign_weight)
+        return enough and applies(self._slot, self._own, self._domain)
+
+    def _weight(self, level: Specificity, value: str) -> float:
+        tally = self._tallies[level]
+        return weight(tally.always(value), tally.seen, self._elsewhere[level].ever(value))
+
+
+def _of_the_rest(
+    counts: Needs, subtask: Subtask, task: str, step: int, config: MiningConfig
+) -> Iterator[Precondition]:
+    """What is about no argument, from one step of one task."""
+    kinds = tuple(counts.kinds(subtask).values())
+    here = counts.here.get((counts.domain.family(subtask), kinds, task, step))
+    if here is None:
+        return
+    for slot, tally in here.slots.items():
+        blind = sum(here.blind.get(v, 0) for v in variables_of(slot))
+        seen = tally.seen if not slot[1] else here.runs - blind
+        true = tally.always("true")
+        if true >= config.contextual_support and true >= seen:
+            yield Precondition(
+                subtask.skill,
+                literal_of(slot, "true"),
+                true,
+                here.runs,
+                weight(true, true),
+                Specificity.TASK,
+                (Support(Specificity.TASK, true, true),),
+            )
+
+
+def _total(tallies: Iterable[Tally]) -> Tally:
+    found = Tally()
+    for t in tallies:
+        found = found.plus(t)
+    return found

@@ -14,7 +14,7 @@ from forestall.embeddings.views import caption_rows
 from forestall.seams import Captioner, TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict, demonstrations_of
+from forestall.types.verdict import Reference, Verdict, demonstrations_of, scenes
 
 
 class CaptionDetector:
@@ -44,6 +44,7 @@ class CaptionDetector:
         Raises:
             InputError: a reference's caption comes from another captioner.
         """
+        references = scenes(references)
         if observation is None:
             return judged(
                 self.name, self._config, (), demonstrations_of(references), "no picture was given"

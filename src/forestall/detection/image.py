@@ -15,7 +15,7 @@ from forestall.seams import ImageEncoder
 from forestall.types.feature import unquantised
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict, demonstrations_of
+from forestall.types.verdict import Reference, Verdict, demonstrations_of, scenes
 
 
 class ImageDetector:
@@ -39,6 +39,7 @@ class ImageDetector:
         Raises:
             InputError: a reference's feature comes from another encoder.
         """
+        references = scenes(references)
         if observation is None:
             return judged(
                 self.name, self._config, (), demonstrations_of(references), "no picture was given"

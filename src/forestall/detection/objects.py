@@ -14,7 +14,7 @@ from forestall.domain.model import Domain
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict, demonstrations_of
+from forestall.types.verdict import Reference, Verdict, demonstrations_of, scenes
 
 
 class ObjectCountDetector:
@@ -41,6 +41,7 @@ class ObjectCountDetector:
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:
         """Compare the counts of the scoped graph with those of every reference."""
+        references = scenes(references)
         mine = counts(observed, self._supports)
         pairs = [(overlap(mine, counts(r.graph, self._supports)), r) for r in references]
         scores = [(round(score, 6), r) for score, r in pairs if score is not None]

@@ -2,17 +2,21 @@
 
 Called like every detector at a boundary; calls the mining of the comparison. It needs no score:
 clutter that no demonstration had changes nothing, and one decisive fact is not diluted by a scene
-that is otherwise alike.
+that is otherwise alike. Told the plan, it needs no reference either: it asks the counts of the
+whole memory, and looks at what later steps need, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 
 from forestall.calibration.fitted import JudgeThresholds
 from forestall.comparison.corrections import Corrections
-from forestall.comparison.preconditions import MiningConfig, mine, violations
+from forestall.comparison.lacking import Knowledge, lacking, step_of
+from forestall.comparison.preconditions import MiningConfig, mine, needed, violations
 from forestall.comparison.relevance import counts
 from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
 from forestall.domain.model import Domain
@@ -21,7 +25,7 @@ from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
-from forestall.types.runtime import When
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.verdict import (
     Calibration,
     Decision,
@@ -30,6 +34,7 @@ from forestall.types.verdict import (
     Verdict,
     Violation,
     demonstrations_of,
+    scenes,
 )
 
 _TOLD = 3
@@ -45,9 +50,11 @@ class PreconditionConfig:
 
     Args:
         threshold: alarm where the score, 1 minus the weight of the heaviest violated precondition,
-            is below. The weight is the rule of succession over its support, (s + 1) / (n + 2): one
-            demonstration weighs 0.67, twelve weigh 0.93. With 0.5 every violation is an alarm; a
-            lower one asks for more demonstrations than one.
+            is below. The weight is the probability that it is a need and no habit
+            (`comparison.tally`): where nothing is known of other times one demonstration weighs
+            0.67, twelve weigh 0.93; what varied at other times weighs more, what never varied
+            less. With 0.5 every violation is an alarm; a lower one asks for more demonstrations
+            than one.
 
     Raises:
         InputError: a threshold that is not between 0 and 1.
@@ -76,6 +83,8 @@ class PreconditionDetector:
         thresholds: from a calibration, which has counted the alarms of good runs: as a judge that
             says yes or no it may alarm or it may not, whatever the weight.
         corrections: what a person says of what is mined.
+        knowledge: what is known of the whole memory and of the plan; None: only the references of
+            a boundary are.
     """
 
     name = "preconditions"
@@ -87,19 +96,32 @@ class PreconditionDetector:
         config: PreconditionConfig | None = None,
         thresholds: JudgeThresholds | None = None,
         corrections: Corrections | None = None,
+        *,
+        knowledge: Knowledge | None = None,
     ) -> None:
         self._domain = domain
+        self._knowledge = knowledge
         self._mining = mining or MiningConfig()
         self._config = config or PreconditionConfig()
         self._thresholds = thresholds
         self._corrections = corrections
         self._mined: dict[object, tuple[Precondition, ...]] = {}
 
+    def knowing(self, knowledge: Knowledge) -> PreconditionDetector:
+        """The same detector with another memory."""
+        other = copy(self)
+        other._knowledge, other._mined = knowledge, {}
+        return other
+
     def judge(
-        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
+        self,
+        observed: SceneGraph,
+        observation: Observation | None,
+        references: Sequence[Reference],
+        context: BoundaryContext | None = None,
     ) -> Verdict:
         """See which mined preconditions hold on the scoped graph of a boundary."""
-        verdict = self._judge(observed, references)
+        verdict = self._judge(observed, references, context)
         if self._thresholds is None or verdict.score is None:
             return verdict
         fits = 0.0 if verdict.decision is Decision.REPLAN else 1.0
@@ -115,26 +137,40 @@ class PreconditionDetector:
         note = f"no alarm, because too many good runs had one; {verdict.note}"
         return replace(verdict, decision=Decision.PROCEED, threshold=0.0, note=note, lacking=())
 
-    def _judge(self, observed: SceneGraph, references: Sequence[Reference]) -> Verdict:
-        subtask = observed.subtask
-        if subtask is None or not references:
+    def _judge(
+        self,
+        observed: SceneGraph,
+        references: Sequence[Reference],
+        context: BoundaryContext | None,
+    ) -> Verdict:
+        subtask, knowledge = observed.subtask, self._knowledge
+        if context is None or context.when is not When.BEFORE:
+            knowledge = None
+        if subtask is None or (knowledge is None and not references):
             return self._verdict(Decision.PROCEED, None, references, NO_REFERENCE)
-        mined = self._preconditions(references, subtask)
-        if not mined:
+        if knowledge is None or context is None:
+            mined = self._preconditions(references, subtask)
+            found = [
+                v
+                for v in violations(mined, observed, subtask, self._domain)
+                if counts(v, subtask, observed, When.BEFORE, self._domain)
+            ]
+        else:
+            here = replace(context, subtask=subtask, scoped=observed, references=tuple(references))
+            step = step_of(references, here.task.name, here.done)
+            mined = self._known(knowledge, here, subtask, step)
+            found = lacking(here, partial(self._known, knowledge, here), knowledge, self._domain)
+        if not mined and not found:
             note = f"nothing always held before {subtask.skill}, so nothing was judged"
+            note = note if references else NO_REFERENCE
             return self._verdict(Decision.PROCEED, None, references, note)
-        found = [
-            v
-            for v in violations(mined, observed, subtask, self._domain)
-            if counts(v, subtask, observed, When.BEFORE, self._domain)
-        ]
         false = [v for v in found if v.truth is Truth.FALSE]
         score = 1.0 - max((weight(v) for v in false), default=0.0)
         if score < self._config.threshold:
             asked = [v for v in false if 1.0 - weight(v) < self._config.threshold]
-            lacking = tuple(dict.fromkeys(v.literal for v in asked))
+            facts = tuple(dict.fromkeys(v.literal for v in asked))
             note = _listed("violated", false)
-            return self._verdict(Decision.REPLAN, score, references, note, lacking)
+            return self._verdict(Decision.REPLAN, score, references, note, facts)
         unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
         strange = self._strange(observed, subtask)
         if unseen or strange:
@@ -157,14 +193,42 @@ class PreconditionDetector:
     ) -> tuple[Precondition, ...]:
         """What always held; mined once for the same references and the same kinds of arguments."""
         key = (subtask, references[0].task, tuple((r.demonstration, r.index) for r in references))
+        return self._once(
+            key,
+            lambda: self._corrected(
+                mine(references, self._domain, self._mining, subtask=subtask),
+                subtask,
+                references[0].task,
+            ),
+        )
+
+    def _known(
+        self, knowledge: Knowledge, context: BoundaryContext, subtask: Subtask, step: int | None
+    ) -> tuple[Precondition, ...]:
+        """What always held in the whole memory; mined once for the same kinds of arguments."""
+        memory, task = knowledge.counts(), context.task.name
+        key = (subtask.skill, tuple(memory.kinds(subtask).values()), task, step, memory.runs)
+        return self._once(
+            key,
+            lambda: self._corrected(
+                needed(memory, subtask, task, step, self._mining), subtask, task
+            ),
+        )
+
+    def _corrected(
+        self, mined: tuple[Precondition, ...], subtask: Subtask, task: str
+    ) -> tuple[Precondition, ...]:
+        if self._corrections is None:
+            return mined
+        return self._corrections.over(mined, subtask, task, self._domain)
+
+    def _once(
+        self, key: object, mined: Callable[[], tuple[Precondition, ...]]
+    ) -> tuple[Precondition, ...]:
         if key not in self._mined:
             if len(self._mined) >= _KEPT:
                 self._mined.clear()
-            found = mine(references, self._domain, self._mining, subtask=subtask)
-            if self._corrections is not None:
-                task = references[0].task
-                found = self._corrections.over(found, subtask, task, self._domain)
-            self._mined[key] = found
+            self._mined[key] = mined()
         return self._mined[key]
 
     def _verdict(
@@ -181,7 +245,7 @@ class PreconditionDetector:
             score,
             self._config.threshold,
             Calibration.UNCALIBRATED if score is None else Calibration.FIXED,
-            nearest=references[0] if references else None,
+            nearest=next(iter(scenes(references)), None),
             references=demonstrations_of(references),
             note=note,
             lacking=lacking,
@@ -189,18 +253,19 @@ class PreconditionDetector:
 
 
 def weight(violation: Violation) -> float:
-    """How much a precondition weighs: the rule of succession; what a person says weighs 1."""
-    p = violation.precondition
-    return 1.0 if p.by_hand else (p.support + 1) / (p.total + 2)
+    """How much a precondition weighs by its evidence."""
+    return violation.precondition.weight
 
 
 def _listed(what: str, found: Sequence[Violation]) -> str:
-    texts = [f"{v.literal} ({_evidence(v.precondition)})" for v in found[:_TOLD]]
+    texts = [f"{v.literal} ({_evidence(v)})" for v in found[:_TOLD]]
     more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return f"{what}: {', '.join(texts)}{more}"
 
 
-def _evidence(precondition: Precondition) -> str:
-    if precondition.by_hand:
+def _evidence(violation: Violation) -> str:
+    p = violation.precondition
+    if p.by_hand:
         return "a correction by hand"
-    return f"held in {precondition.support} of {precondition.total}"
+    later = f", before {p.skill}, {violation.ahead} steps ahead" if violation.ahead else ""
+    return f"held in {p.support} of {p.total}{later}"

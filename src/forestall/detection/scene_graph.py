@@ -21,6 +21,7 @@ from forestall.types.verdict import (
     Threshold,
     Verdict,
     demonstrations_of,
+    scenes,
 )
 
 NO_REFERENCE = "no reference above the floor: nothing to compare with, so nothing was judged"
@@ -82,6 +83,7 @@ class SceneGraphDetector:
     ) -> Verdict:
         """Compare the scoped graph of a boundary with every reference."""
         line = drawn(self._thresholds, observed.subtask, self._config.threshold)
+        references = scenes(references)
         able = [r for r in references if not unseen_by(r, observed)]
         best = self._scorer.best(observed, able)
         if best is None or best.score is None:

@@ -1,16 +1,21 @@
 """Diagnosis without a language model: which fact that held in every demonstration fails now.
 
 Called by the strategies. Preconditions are mined from the retrieved demonstrations by the callables
-given to the constructor; nothing is asked of a simulator. After a subtask the references show what
-held after it, and the same mining gives its postconditions.
+given to the constructor, or, before a subtask, from the counts of the whole memory; then what later
+steps need and no step puts right is a cause, too. Nothing is asked of a simulator. After a subtask
+the references show what held after it, and the same mining gives its postconditions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from forestall.comparison.corrections import Corrections
+from forestall.comparison.lacking import Knowledge, lacking, step_of
+from forestall.comparison.needs import Needs
+from forestall.comparison.preconditions import needed
 from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
@@ -46,6 +51,9 @@ class Miner(Protocol):
         """Preconditions, the best supported first."""
 
 
+Remembered = Callable[[Needs, Subtask, str | None, int | None], Sequence[Precondition]]
+"""Counts of a memory, subtask, task, step → what is mined of them."""
+
 Violations = Callable[[Sequence[Precondition], SceneGraph, Subtask, Domain], Sequence[Violation]]
 
 
@@ -57,6 +65,9 @@ class SymbolicReasoner:
         violations: preconditions → those that do not hold on a graph, ground.
         domain: the categories.
         corrections: what a person says of what held before subtasks.
+        knowledge: what is known of the whole memory and of the plan; None: only the references of
+            a boundary are.
+        remembered: mines from that memory.
     """
 
     name = "preconditions"
@@ -67,29 +78,24 @@ class SymbolicReasoner:
         violations: Violations,
         domain: Domain,
         corrections: Corrections | None = None,
+        *,
+        knowledge: Knowledge | None = None,
+        remembered: Remembered = needed,
     ) -> None:
         self.mine = mine
         self.violations = violations
         self.domain = domain
         self.corrections = corrections
+        self._knowledge, self._remembered = knowledge, remembered
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         """Name the violated facts about the subtask's arguments; unobserved ones do not count."""
         subtask, graph, when = context.subtask, context.graph, context.when
-        if not context.references:
+        knows = self._knowledge is not None and when is When.BEFORE
+        if not context.references and not knows:
             return self._nothing(f"there is no demonstration to compare {subtask} with")
-        preconditions = self.mine(
-            context.references, self.domain, subtask=subtask, task=context.task.name
-        )
-        if self.corrections is not None and when is When.BEFORE:
-            preconditions = self.corrections.over(
-                preconditions, subtask, context.task.name, self.domain
-            )
-        broken = [
-            v
-            for v in self.violations(preconditions, graph, subtask, self.domain)
-            if v.truth is Truth.FALSE and counts(v, subtask, graph, when, self.domain)
-        ]
+        preconditions, found = self._known(context) if knows else self._shown(context)
+        broken = [v for v in found if v.truth is Truth.FALSE]
         if not broken:
             count = demonstrations_of(context.references)
             return self._nothing(
@@ -97,12 +103,15 @@ class SymbolicReasoner:
                 f"{in_demonstrations(count, count)}{_difference(verdict)}"
             )
         domain = self.domain
-        broken.sort(key=lambda v: (-v.precondition.weight, _rank(v.literal, domain), v.literal))
+        broken.sort(key=lambda v: _order(v, domain))
         failed = {v.literal for v in broken}
         ground = (p.literal.bind(domain.bound(subtask)) for p in preconditions)
         stay = {x for x in ground if x not in failed and truth(graph, x, domain) is Truth.TRUE}
         planned = context.plan.subtasks[context.index]
-        causes = [explain(v, graph, planned, domain, when) for v in broken]
+        later = context.remaining()
+        causes = [
+            explain(v, graph, later[v.ahead] if v.ahead else planned, domain, when) for v in broken
+        ]
         culprits = dict.fromkeys(
             y for v in broken for x in _culprits(v.literal, graph, domain) for y in _ids(graph, x)
         )
@@ -115,8 +124,53 @@ class SymbolicReasoner:
             support=(broken[0].precondition.support, broken[0].precondition.total),
         )
 
+    def _shown(
+        self, context: BoundaryContext
+    ) -> tuple[Sequence[Precondition], Sequence[Violation]]:
+        """What the references show, and what of it is not so."""
+        subtask, graph = context.subtask, context.graph
+        mined = self.mine(context.references, self.domain, subtask=subtask, task=context.task.name)
+        if context.when is When.BEFORE:
+            mined = self._corrected(mined, subtask, context.task.name)
+        return mined, [
+            v
+            for v in self.violations(mined, graph, subtask, self.domain)
+            if counts(v, subtask, graph, context.when, self.domain)
+        ]
+
+    def _known(
+        self, context: BoundaryContext
+    ) -> tuple[Sequence[Precondition], Sequence[Violation]]:
+        """What the whole memory shows, and what of it is not so, for later steps, too."""
+        assert self._knowledge is not None
+        memory, task = self._knowledge.counts(), context.task.name
+
+        def mined(subtask: Subtask, step: int | None) -> Sequence[Precondition]:
+            return self._corrected(self._remembered(memory, subtask, task, step), subtask, task)
+
+        step = step_of(context.references, task, context.done)
+        whole = replace(context, scoped=context.graph)
+        found = lacking(whole, mined, self._knowledge, self.domain)
+        return mined(context.subtask, step), found
+
+    def _corrected(
+        self, mined: Sequence[Precondition], subtask: Subtask, task: str
+    ) -> Sequence[Precondition]:
+        if self.corrections is None:
+            return mined
+        return self.corrections.over(mined, subtask, task, self.domain)
+
     def _nothing(self, cause: str) -> Diagnosis:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
+
+
+def _order(violation: Violation, domain: Domain) -> tuple[object, ...]:
+    """Which violation names the cause: what cannot be undone, then what weighs most, then basic.
+
+    Weights that differ by chance are one weight.
+    """
+    v = violation
+    return v.undoable, -round(v.precondition.weight, 1), _rank(v.literal, domain), v.literal
 
 
 def _difference(verdict: Verdict) -> str:

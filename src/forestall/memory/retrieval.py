@@ -1,13 +1,17 @@
 """Context-aware reference retrieval (paper, Sec. 3): which demonstrated steps are like this one.
 
-Called by strategies at each boundary; calls the text encoder. Exact search in one matrix.
+Called by strategies at each boundary; calls the text encoder. Exact search in one matrix. Steps of
+the same words come first: their whole scene can be compared. After them come steps of the same
+skill on other things that play the same part, of any task, which say what the skill needs and
+nothing else (`Reach.ROLE`).
 """
 
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +19,9 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, MemoryFileError
 from forestall.seams import DemonstrationStore, TextEncoder
 from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.facts import category_of
 from forestall.types.plan import Subtask
-from forestall.types.verdict import Reference
+from forestall.types.verdict import Reach, Reference
 
 _NUMBER = re.compile(r"-\d+\b")
 
@@ -36,6 +41,8 @@ class RetrievalConfig:
             occurs twice in a task is not taken for its other occurrence without a contradiction.
         same_task_bonus: added to a similarity for ranking when the step is of the same task.
         same_skill: whether only steps of the same skill count (those of one family are one).
+        roles: how many steps of the same skill on other things at most, one of a demonstration;
+            those come first that share most of what the things are good for.
     """
 
     k: int | None = None
@@ -43,10 +50,13 @@ class RetrievalConfig:
     per_demonstration: int = 2
     same_task_bonus: float = 0.05
     same_skill: bool = True
+    roles: int = 4
 
     def __post_init__(self) -> None:
         if (self.k is not None and self.k < 1) or self.per_demonstration < 1:
             raise InputError("k and per_demonstration are at least 1")
+        if self.roles < 0:
+            raise InputError("roles is at least 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +114,21 @@ class EmbeddingRetriever:
         self._tasks = np.array([e.demonstration.task for e in self._entries])
         self._indices = np.array([e.step.index for e in self._entries])
         self._skills = np.array([domain.family(e.step.subtask) for e in self._entries])
+        self._sorts: dict[str, dict[tuple[tuple[str, ...], str], list[_Entry]]] = defaultdict(dict)
+        for e in self._entries:
+            sort = (_kinds(e.step.subtask.args, domain), e.demonstration.task)
+            self._sorts[domain.family(e.step.subtask)].setdefault(sort, []).append(e)
 
     def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
-        """References for a subtask, best first; none above the floor: an empty list.
+        """References for a subtask, best first; none above the floor and no role: an empty list.
 
         Ranked by similarity with the bonus of the same task; among equals the step whose position
         in its demonstration is closest to `done` comes first, then demonstration and position.
         """
+        found = self._scenes(subtask, task, done)
+        return [*found, *self._roles(subtask, task, {r.demonstration for r in found})]
+
+    def _scenes(self, subtask: Subtask, task: str, done: int) -> list[Reference]:
         config = self._config
         similarity = self._matrix @ self._encoder.encode([subtask_words(subtask, self._domain)])[0]
         similarity = np.minimum(np.round(similarity.astype(np.float64), 6), 1.0)
@@ -131,6 +149,48 @@ class EmbeddingRetriever:
             if len(found) == config.k:
                 break
         return found
+
+    def _roles(self, subtask: Subtask, task: str, but: set[str]) -> list[Reference]:
+        """Steps of the same skill on other things, best first, a few of every sort.
+
+        What they share is the mean over the arguments of how many tags and attributes both have.
+        """
+        if not self._config.roles:
+            return []
+        own = _kinds(subtask.args, self._domain)
+        groups = [
+            (self._shared(own, kinds), elsewhere == task, elsewhere, kinds, entries)
+            for (kinds, elsewhere), entries in self._sorts.get(
+                self._domain.family(subtask), {}
+            ).items()
+            if len(kinds) == len(own)
+        ]
+        ranked = sorted(groups, key=lambda g: (-g[0], *g[1:4]))
+        found: list[Reference] = []
+        used = set(but)
+        for of_each in range(self._config.roles):  # many of one sort say no more than one
+            for shared, _, _, _, entries in ranked:
+                if of_each < len(entries) and entries[of_each].demonstration.id not in used:
+                    used.add(entries[of_each].demonstration.id)
+                    reference = _reference(entries[of_each], round(shared, 6))
+                    found.append(replace(reference, reach=Reach.ROLE))
+                    if len(found) == self._config.roles:
+                        return found
+        return found
+
+    def _shared(self, own: tuple[str, ...], other: tuple[str, ...]) -> float:
+        parts = [self._alike(a, b) for a, b in zip(own, other, strict=True)]
+        return sum(parts) / len(parts) if parts else 1.0
+
+    def _alike(self, one: str, other: str) -> float:
+        if one == other:
+            return 1.0
+        first, second = self._domain.kinds(one) - {one}, self._domain.kinds(other) - {other}
+        return len(first & second) / max(len(first | second), 1)
+
+
+def _kinds(args: Sequence[str], domain: Domain) -> tuple[str, ...]:
+    return tuple(category_of(domain.canonical(a)) for a in args)
 
 
 def _reference(entry: _Entry, similarity: float) -> Reference:

@@ -40,18 +40,26 @@ class AskedRetriever:
 
 
 class AskedDetector:
-    """Judges within its time."""
+    """Judges within its time; one that takes a `context` is told the plan, too."""
 
     def __init__(self, detector: Detector) -> None:
         self._detector, self.name = detector, detector.name
+        self._plans = "context" in signature(detector.judge).parameters
 
     def judge(
-        self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
+        self,
+        observed: SceneGraph,
+        observation: Observation | None,
+        references: Sequence[Reference],
+        context: BoundaryContext | None = None,
     ) -> Verdict:
         """As the detector."""
-        judge = self._detector.judge
-        part = f"detector {self.name}"
-        return ask(part, "detect", Verdict, judge, observed, observation, references)
+
+        def judged() -> Verdict:
+            plan: dict[str, Any] = {"context": context} if self._plans else {}
+            return self._detector.judge(observed, observation, references, **plan)
+
+        return ask(f"detector {self.name}", "detect", Verdict, judged)
 
 
 class AskedReasoner:

@@ -50,9 +50,9 @@ class DetectorJudge:
 
     def judge(self, context: BoundaryContext) -> Verdict:
         """Judge the scene that is scoped to the subtask."""
-        verdict = self._detector.judge(
-            context.scoped, context.observation, self._references(context)
-        )
+        references = tuple(self._references(context))
+        context = replace(context, references=references)
+        verdict = self._detector.judge(context.scoped, context.observation, references, context)
         return replace(verdict, detector=self.name)
 
     def _references(self, context: BoundaryContext) -> Sequence[Reference]:

@@ -19,7 +19,7 @@ from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
-from forestall.types.verdict import Decision, Diagnosis, Reference, Verdict
+from forestall.types.verdict import Decision, Diagnosis, Reference, Verdict, scenes
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
 
@@ -132,7 +132,7 @@ class Online:
         return self._intervention.alarm(context, verdict, diagnosis, clock)
 
     def _references(self, context: BoundaryContext) -> tuple[Reference, ...]:
-        return tuple(self._retriever.retrieve(context.subtask, context.task.name, context.done))
+        return scenes(self._retriever.retrieve(context.subtask, context.task.name, context.done))
 
     def _outcome_only(
         self, diagnosis: Diagnosis, references: tuple[Reference, ...], verdict: Verdict

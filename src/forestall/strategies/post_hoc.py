@@ -14,7 +14,7 @@ from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetrie
 from forestall.strategies.intervention import Clock, Intervention, look_again
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
-from forestall.types.verdict import Decision, Diagnosis, Verdict
+from forestall.types.verdict import Decision, Diagnosis, Verdict, scenes
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
 
@@ -75,7 +75,7 @@ class PostHoc:
         if context.index == 0:
             self._summary = _Summary()
         clock = Clock()
-        references = tuple(
+        references = scenes(
             self._retriever.retrieve(context.subtask, context.task.name, context.done)
         )
         clock.lap("retrieve")

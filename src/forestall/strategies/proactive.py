@@ -93,7 +93,9 @@ class Proactive:
         context = self._with_references(context, clock)
         if self._panel is not None:
             return self._by_panel(self._panel, context, clock)
-        verdict = self._detector.judge(context.scoped, context.observation, context.references)
+        verdict = self._detector.judge(
+            context.scoped, context.observation, context.references, context
+        )
         clock.lap("compare")
         if verdict.decision is Decision.LOOK_AGAIN and context.may_look:
             return StrategyAnswer(Decision.LOOK_AGAIN, verdict, seconds=clock.items())

@@ -72,7 +72,7 @@ class Watch:
         )
         clock.lap("retrieve")
         context = replace(context, references=references)
-        verdict = self._primary.judge(context.scoped, context.observation, references)
+        verdict = self._primary.judge(context.scoped, context.observation, references, context)
         clock.lap("compare")
         if verdict.decision is Decision.LOOK_AGAIN:
             if context.may_look:

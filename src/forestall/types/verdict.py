@@ -32,6 +32,13 @@ class Calibration(Enum):
     UNCALIBRATED = "uncalibrated"
 
 
+class Reach(Enum):
+    """How much of a demonstrated step speaks of the subtask at hand."""
+
+    SCENE = "scene"  # the same words: the whole scene can be compared
+    ROLE = "role"  # the same skill on what plays the same part: what the skill needs, and no more
+
+
 @dataclass(frozen=True, slots=True)
 class Threshold:
     """Where a detector draws the line, and what that rests on.
@@ -61,6 +68,12 @@ class Reference:
     later: tuple[Subtask, ...] = ()  # what the demonstration did afterwards, this step first
     view: View | None = None  # the picture as a whole, where it was kept
     after: SceneGraph | None = None  # everything that was known after the step, if anybody looked
+    reach: Reach = Reach.SCENE
+
+
+def scenes(references: Sequence[Reference]) -> tuple[Reference, ...]:
+    """The references whose whole scene can be compared."""
+    return tuple(r for r in references if r.reach is Reach.SCENE)
 
 
 def demonstrations_of(references: Sequence[Reference]) -> int:
@@ -99,12 +112,33 @@ class Discrepancy:
     text: str
 
 
+class Specificity(Enum):
+    """Of which demonstrations a precondition is mined, the narrowest first."""
+
+    TASK = "this task"  # and the same kinds of things
+    CATEGORY = "any task"  # the same kinds of things
+    PART = "any kind"  # any task, and every kind of thing that plays the same part
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """In how many demonstrations at one level a literal held, and in how many it was observed."""
+
+    level: Specificity
+    true: int
+    seen: int
+
+
 @dataclass(frozen=True, slots=True)
 class Precondition:
     """A lifted literal that held in the demonstrations before a skill.
 
-    `literal` uses ?object and ?target (and category names for other things). `support` of `total`
-    demonstrations had it true; the others had it unobserved or false. `by_hand`: a person says so.
+    `literal` uses the skill's variables (and category names for other things). `support` of `total`
+    demonstrations had it true; the others had it unobserved or false. `weight` is the probability
+    that it is a need and no habit. `kept` is the level that support and weight are of; `levels` has
+    the support at each. `elsewhere` counts the demonstrations in which it held at other times for
+    things of these kinds, and those in which it did not: without the second nothing ever varied.
+    `by_hand`: a person says so.
     """
 
     skill: str
@@ -112,16 +146,25 @@ class Precondition:
     support: int
     total: int
     weight: float = 1.0
+    kept: Specificity = Specificity.CATEGORY
+    levels: tuple[Support, ...] = ()
+    elsewhere: tuple[int, int] = (0, 0)
     by_hand: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """A mined precondition that does not hold now, ground on the observed graph."""
+    """A mined precondition that does not hold now, ground on the observed graph.
+
+    `ahead` counts the steps of the plan until the one that it is a precondition of; `undoable` is
+    False where the plan, if nothing is done, does something because of it that cannot be undone.
+    """
 
     precondition: Precondition
     literal: Literal  # ground
     truth: Truth  # FALSE or UNOBSERVED
+    ahead: int = 0
+    undoable: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,155 @@
+"""Needs counted over arguments, tasks and kinds of things, and told from habit by variation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+from adding import medians
+from graph_pairs import scene
+
+from forestall.comparison.needs import Needs
+from forestall.comparison.preconditions import needed
+from forestall.comparison.tally import Tally, weight
+from forestall.domain.load import shipped
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.plan import Subtask
+from forestall.types.verdict import Precondition, Specificity
+
+DOMAIN = shipped("household")
+Step = tuple[str, str, str]
+"""Objects, relations, subtask."""
+
+
+def run(task: str, name: str, *steps: Step) -> Demonstration:
+    graphs = [scene(*s) for s in steps]
+    return Demonstration(
+        task,
+        "room",
+        1,
+        tuple(
+            DemonstrationStep(i, Subtask.parse(s[2]), g, g)
+            for i, (s, g) in enumerate(zip(steps, graphs, strict=True))
+        ),
+        id=name,
+    )
+
+
+def pick(thing: str, states: str = "", relations: str = "", category: str = "") -> Step:
+    name = f"{category or thing}-1"
+    return (f"gripper; {name} {states}; Pot-1; Sink-1", relations, f"pick_up({name})")
+
+
+def mined(
+    runs: Sequence[Demonstration], subtask: str, task: str | None = "now"
+) -> dict[str, Precondition]:
+    found = needed(Needs.of(runs, DOMAIN), Subtask.parse(subtask), task, None)
+    return {str(p.literal): p for p in found}
+
+
+def test_weights_are_the_documented_ones() -> None:
+    assert weight(1, 1) == pytest.approx(2 / 3), "the rule of succession"
+    assert weight(4, 4) == pytest.approx(5 / 6)
+    assert weight(0, 0) == pytest.approx(1 / 2)
+    never_varied, varied = weight(4, 4, (4, 0)), weight(4, 4, (4, 4))
+    assert never_varied == pytest.approx(9 / 14)
+    assert 0.5 < weight(4, 4, (400, 0)) < 0.51 < never_varied < weight(4, 4) < varied
+    assert weight(4, 4, (0, 4)) > varied > 0.9
+    assert weight(3, 4) < 0.5, "what was false once of four times is no need"
+    assert weight(39, 40, (20, 20)) > 0.9, "one exception of forty may be a mistake of the eyes"
+
+
+def test_a_tally_counts_runs_and_takes_back() -> None:
+    tally = Tally()
+    for values in ({"a"}, {"a", "b"}, set[str]()):
+        tally.add(values)
+    assert (tally.runs, tally.seen, tally.always("a"), tally.ever("a")) == (3, 2, 1, (2, 1))
+    assert tally.ever("b") == (1, 2)
+    tally.add({"a", "b"}, -1)
+    assert (tally.seen, tally.ever("a"), tally.ever("b")) == (1, (1, 0), (0, 1))
+
+
+def test_support_is_told_at_each_level_with_the_one_that_it_was_kept_at() -> None:
+    runs = [run("now", "a", pick("Mug")), run("other", "b", pick("Mug"))]
+    runs += [run("third", f"c{i}", pick("Cup")) for i in range(3)]
+    found = mined(runs, "pick_up(Mug-1)")["unblocked(?object)"]
+    assert [(s.level, s.true, s.seen) for s in found.levels] == [
+        (Specificity.TASK, 1, 1),
+        (Specificity.CATEGORY, 2, 2),
+        (Specificity.PART, 5, 5),
+    ]
+    assert (found.kept, found.support, found.total) == (Specificity.PART, 5, 5)
+
+
+def test_a_task_without_demonstrations_is_judged_by_those_of_others() -> None:
+    runs = [run("other", f"b{i}", pick("Mug")) for i in range(3)]
+    for task in ("new", None):
+        assert mined(runs, "pick_up(Mug-1)", task)["unblocked(?object)"].support == 3
+        assert mined(runs, "pick_up(Cup-1)", task)["unblocked(?object)"].kept is Specificity.PART
+
+
+def test_the_narrower_level_has_the_last_word() -> None:
+    blocked = pick("Mug", relations="Pot-1 blocking Mug-1")
+    runs = [run("other", f"b{i}", pick("Cup")) for i in range(20)] + [run("now", "a", blocked)]
+    assert "unblocked(?object)" in mined(runs, "pick_up(Cup-1)")
+    assert "unblocked(?object)" not in mined(runs, "pick_up(Mug-1)")
+
+
+def test_what_the_task_makes_of_a_thing_stays_there_unless_it_varied_elsewhere() -> None:
+    washed = (pick("Mug", "dirty=clean"), ("gripper; Mug-1 dirty=dirty; Sink-1", "", "wait()"))
+    plain = [run(t, t, pick("Mug", "dirty=clean")) for t in ("a", "b")]
+    assert "dirty(?object)=clean" not in mined(plain, "pick_up(Mug-1)", "new")
+    assert "dirty(?object)=clean" in mined(plain, "pick_up(Mug-1)", "a")
+    drive = ("gripper; Mug-1 dirty=dirty; Sink-1", "", "navigate_to_obj(Mug-1)")
+    varied = [run(t, f"{t}{i}", drive, washed[0]) for t in ("a", "b") for i in range(2)]
+    found = mined(varied, "pick_up(Mug-1)", "new")["dirty(?object)=clean"]
+    assert found.elsewhere == (0, 4) and found.weight > 0.9
+    assert found.kept is Specificity.CATEGORY
+
+
+def test_what_never_varied_weighs_less_than_what_varied_at_other_times() -> None:
+    steps = (
+        ("gripper; Mug-1 dirty=clean filled=water; Sink-1", "", "navigate_to_obj(Mug-1)"),
+        pick("Mug", "dirty=clean filled=empty"),
+    )
+    found = mined([run("now", f"d{i}", *steps) for i in range(4)], "pick_up(Mug-1)")
+    habit, need = found["dirty(?object)=clean"], found["filled(?object)=empty"]
+    assert (habit.elsewhere, need.elsewhere) == ((4, 0), (0, 4))
+    assert (habit.support, need.support) == (4, 4)
+    assert habit.weight == pytest.approx(9 / 14) and need.weight > 0.95
+
+
+def test_unobserved_counts_on_neither_side() -> None:
+    steps = (
+        ("gripper; Mug-1 dirty=?; Sink-1", "", "navigate_to_obj(Mug-1)"),
+        pick("Mug", "dirty=clean"),
+    )
+    runs = [run("now", f"d{i}", *steps) for i in range(3)]
+    found = mined([*runs, run("now", "e", pick("Mug", "dirty=?"))], "pick_up(Mug-1)")
+    kept = found["dirty(?object)=clean"]
+    assert (kept.support, kept.total, kept.elsewhere) == (3, 4, (0, 0))
+
+
+def test_what_a_skill_always_changed_is_known() -> None:
+    closed = ("gripper; Fridge-1 open=closed", "", "open_obj(Fridge-1)")
+    opened = ("gripper; Fridge-1 open=open", "", "close_obj(Fridge-1)")
+    counts = Needs.of([run("now", "a", closed, opened)], DOMAIN)
+    assert "open(Fridge-2)=open" in map(
+        str, counts.brings_about(Subtask.parse("open_obj(Fridge-2)"))
+    )
+    assert not counts.brings_about(Subtask.parse("close_obj(Fridge-2)"))
+
+
+def test_counting_one_after_another_and_all_at_once_are_the_same() -> None:
+    runs = [run("now", "a", pick("Mug")), run("b", "b", pick("Cup", "dirty=dirty"))]
+    one = Needs(DOMAIN)
+    for r in runs:
+        one.learn(r)
+    for subtask in ("pick_up(Mug-1)", "pick_up(Cup-1)"):
+        parsed = Subtask.parse(subtask)
+        assert needed(one, parsed, "now", 0) == needed(Needs.of(runs, DOMAIN), parsed, "now", 0)
+
+
+def test_one_more_costs_the_same_in_a_large_memory() -> None:
+    small, large = medians((20, 400), repeats=15)
+    assert large <= 2 * small
