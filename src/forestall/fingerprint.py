@@ -12,6 +12,9 @@ _ROOT = Path(__file__).parent
 PRESENTATION = ("cli", "report", "training", "experiments")
 """Packages that show results or train models, and change no run."""
 
+JUDGING = ("calibration", "comparison", "detection", "diagnosis", "learning", "replanning")
+"""Packages that judge scenes and mend plans: in a run that nobody watches they have no say."""
+
 ROW_MAKING = (
     "experiments/conduct.py", "experiments/runs.py", "experiments/speed.py",
     "experiments/worker.py", "records/derived.py",
@@ -28,12 +31,15 @@ def weights_of(names: Iterable[str]) -> list[tuple[str, str]]:
     return [(name, folder) for name, folder in found if folder]
 
 
-def sources_digest(extra: Sequence[object] = (), but: Sequence[str] = ()) -> str:
+def sources_digest(
+    extra: Sequence[object] = (), but: Sequence[str] = (), without: Sequence[str] = ()
+) -> str:
     """Sixteen hexadecimal digits of the sources, the shipped data, and what is given besides.
 
     Args:
         extra: further things that what is keyed depends on; their `repr` counts.
         but: files of the packages that show results, which matter all the same.
+        without: further packages that change nothing.
     """
     digest = hashlib.blake2b(repr(tuple(extra)).encode(), digest_size=8)
     for path in sorted(
@@ -41,7 +47,7 @@ def sources_digest(extra: Sequence[object] = (), but: Sequence[str] = ()) -> str
     ):
         place = path.relative_to(_ROOT)
         counting = place.parts[0] == "statistics" and place.stem not in RUNNING
-        shows = place.parts[0] in PRESENTATION and place.as_posix() not in but
+        shows = place.parts[0] in (*PRESENTATION, *without) and place.as_posix() not in but
         if not shows and not counting:
             digest.update(place.as_posix().encode())
             digest.update(path.read_bytes())

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sqlite3
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
@@ -16,6 +19,7 @@ from forestall.assembly.recording import RecordingJob, jobs_for, keyed, record_i
 from forestall.config import cache_dir
 from forestall.errors import ForestallError, MemoryFileError
 from forestall.files import alone
+from forestall.fingerprint import JUDGING
 from forestall.memory.store import open_store
 from forestall.types.demonstration import Demonstration
 
@@ -185,3 +189,21 @@ def test_varied_demonstrations_do_the_task_in_other_ways(
         assert record_into(store, jobs_for(["fasten-plate"], kitchens=6), 1) == 5
         ways = [tuple(str(s.subtask) for s in d.steps) for d in store.all()]
     assert len(set(ways)) > 3
+
+
+def test_packages_that_judge_have_no_say_in_a_recording() -> None:
+    """So that a change of theirs leaves what was recorded as it is."""
+    called: set[str] = set()
+
+    def tell(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and frame.f_code.co_flags & inspect.CO_OPTIMIZED:
+            called.add(frame.f_code.co_filename)
+
+    sys.setprofile(tell)
+    try:
+        record_one(JOBS[0])
+    finally:
+        sys.setprofile(None)
+    ours = {p.parts for f in called if "forestall" in (p := Path(f)).parts}
+    assert any("tasks" in parts for parts in ours), "nothing was recorded"
+    assert [p for p in ours if set(p) & set(JUDGING) and p[-1] != "options.py"] == []

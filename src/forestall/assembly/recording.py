@@ -22,7 +22,7 @@ from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.model import Domain
 from forestall.embeddings.views import view_of
 from forestall.errors import ForestallError
-from forestall.fingerprint import sources_digest, weights_of
+from forestall.fingerprint import JUDGING, sources_digest, weights_of
 from forestall.kinds import (
     CAPTIONER,
     DOMAIN,
@@ -274,7 +274,8 @@ def content_of(config: RunConfig) -> str:
     parts = [p for p in parts if p[0] in RECORDED]
     weights = weights_of(p[1] for p in parts)
     inputs = [loaded.task, digest_of(loaded.domain), parts, weights]
-    return sources_digest([forestall.__version__, KITCHENS_PER_TASK, TRIES, *inputs])
+    said = [forestall.__version__, KITCHENS_PER_TASK, TRIES, *inputs]
+    return sources_digest(said, without=JUDGING)
 
 
 def recorded_given(given: Given) -> Given:
