@@ -25,6 +25,9 @@ from forestall.statistics.tables import Table, tables
 
 SUMMARY = "summary.json"
 
+CALIBRATION = "calibration"
+"""Folder inside that of an experiment: watched runs of another split, for thresholds."""
+
 STAND_INS = {
     ("image", "two-tower"): "image (stand-in: our small encoder)",
     ("caption", "listing"): "caption (stand-in: a list of what is seen)",
@@ -94,7 +97,23 @@ def summary_of(
         raise
     except InputError as error:  # names that this version does not know
         raise FileFormatError(f"{path}: {error}") from error
-    return summarised(rows, meta, notes, names), rows, meta, names
+    apart = calibration_of(path, about)
+    return summarised(rows, meta, notes, names, apart), rows, meta, names
+
+
+def calibration_of(path: Path, about: dict[str, Any]) -> list[EpisodeRow]:
+    """Rows of the folder inside that thresholds are drawn from, none where there is none.
+
+    Raises:
+        FileFormatError: it holds the same split.
+    """
+    inside = path / CALIBRATION
+    if not inside.is_dir():
+        return []
+    folder = episodes_in(inside)
+    if folder.about()["split"] == about["split"]:
+        raise FileFormatError(f"{inside} is of the split {about['split']}, as what it calibrates")
+    return list(folder.rows().values())
 
 
 def _missing(

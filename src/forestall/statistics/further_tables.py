@@ -61,6 +61,7 @@ def further_tables(content: Content, names: Names) -> list[Table]:
         _judges_by_model(content, names),
         _strategies_by_model(content, names),
         _demonstrations(content, names),
+        *_bounded(content, names),
         compared_table(
             "comparisons", "What else is compared", content["comparisons"], names, by="topic"
         ),
@@ -222,6 +223,39 @@ def _demonstrations(content: Content, names: Names) -> Table:
         ("judge", "demonstrations", *heads(columns)),
         tuple(rows),
     )
+
+
+def _bounded(content: Content, names: Names) -> list[Table]:
+    """None where nothing was calibrated."""
+    found = content["bounded"]
+    if found is None:
+        return []
+    columns: Columns = (
+        ("detected in time", "in_time", share),
+        ("false alarms per undisturbed run", "false_alarms_per_run_undisturbed", share),
+        ("false alarms per harmless run", "false_alarms_per_run_harmless", share),
+        ("cause named right", "cause_right", share),
+    )
+    rows = [
+        (shown(name, names), _lines(judge["thresholds"]), *cells(judge, columns))
+        for name, judge in found["judges"].items()
+    ]
+    bound = f"{100 * found['level']:.0f} %"
+    table = Table(
+        "bounded",
+        f"At a bound of {bound} on false alarms per run",
+        ("judge", "alarm below", *heads(columns)),
+        tuple(rows),
+        f"Thresholds are drawn from {found['runs']} undisturbed runs of other rooms, so that the "
+        f"expected share of new ones with an alarm is at most {bound}; so many runs can show "
+        f"{100 * found['smallest_level']:.1f} % at best. `or`: together under one bound; `and`: "
+        "all must alarm at one boundary. A dash: no alarm is possible within the bound.",
+    )
+    return [table]
+
+
+def _lines(drawn: Sequence[float | None]) -> str:
+    return ", ".join(DASH if t is None or t <= 0 else f"{t:.3f}" for t in drawn)
 
 
 def _limits(content: Content, names: Names) -> Table:

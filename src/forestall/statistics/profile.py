@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from forestall.statistics.bounded import bounded
 from forestall.statistics.cases import Case
 from forestall.statistics.cells import Names
 from forestall.statistics.comparisons import comparisons
@@ -65,13 +66,19 @@ GROUPS: Mapping[str, Callable[[EpisodeRow], str | None]] = {
 }
 
 
-def content(rows: Sequence[EpisodeRow], profile: str, names: Names | None) -> dict[str, Any]:
+def content(
+    rows: Sequence[EpisodeRow],
+    profile: str,
+    names: Names | None,
+    calibration: Sequence[EpisodeRow] = (),
+) -> dict[str, Any]:
     """What the rows of one profile say.
 
     Args:
         rows: of that profile alone, each once.
         profile: its name.
         names: what is shown in place of a judge's name, in sentences.
+        calibration: rows of the same profile and another split, to draw thresholds from.
 
     Raises:
         InputError: a failing run does not say when its failure can be known.
@@ -103,6 +110,7 @@ def content(rows: Sequence[EpisodeRow], profile: str, names: Names | None) -> di
         "detectors_by_set": by_set,
         "curves": {of: curves_of(runs, of) for of in by_set},
         "demonstrations": by_demonstrations(runs, by_set[main]),
+        "bounded": bounded(rows, calibration) if calibration else None,
         "constant": constancy(runs),
         "not_judged": not_judged(runs),
         "unforeseeable": unforeseeable(runs),

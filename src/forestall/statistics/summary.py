@@ -32,6 +32,7 @@ def summary(
     meta: Mapping[str, Any],
     notes: Sequence[str] = (),
     names: Names | None = None,
+    calibration: Iterable[EpisodeRow] = (),
 ) -> dict[str, Any]:
     """Summarise an experiment.
 
@@ -40,12 +41,13 @@ def summary(
         meta: kept as it is: machine, versions, arguments.
         notes: what is to be said below every table, such as what is missing.
         names: what is shown in place of a judge's name; kept for the tables.
+        calibration: rows of another split, that thresholds are drawn from.
 
     Raises:
         InputError: an episode is there twice, or a failing one does not say when its failure can
             be known.
     """
-    found = canonical(rows)
+    found, apart = canonical(rows), canonical(calibration)
     there = {r.profile for r in found} or {KIND}
     profiles = [p for p in (HONEST, KIND) if p in there]
     plain = _plain(
@@ -57,7 +59,13 @@ def summary(
             "episodes": _episodes(found, notes),
             "shown": profiles[0],
             "profiles": {
-                p: content([r for r in found if r.profile == p], p, names) for p in profiles
+                p: content(
+                    [r for r in found if r.profile == p],
+                    p,
+                    names,
+                    [r for r in apart if r.profile == p],
+                )
+                for p in profiles
             },
         }
     )
