@@ -88,6 +88,27 @@ def test_perception_that_does_not_answer_holds_and_nothing_is_asked_before_a_new
     assert monitor.before(seen(3)).outcome is Outcome.PROCEED
 
 
+def test_perception_is_told_what_was_carried_out_and_holds_where_it_fails_then() -> None:
+    monitor, eye = seeing(Limits())
+    told: list[Subtask] = []
+    eye.acted = told.append  # type: ignore[attr-defined]
+    monitor.before(seen(1))
+    monitor.after(REFUSED)
+    assert told == [], "nothing was done"
+    monitor.start(PLAN)
+    monitor.before(seen(2))
+    monitor.after(replace(DONE, status=SkillStatus.FAILED))
+    assert told == [Subtask.parse("pick_up(Mug-1)")]
+
+    def breaks(subtask: Subtask) -> None:
+        raise ValueError(subtask.skill)
+
+    eye.acted = breaks  # type: ignore[attr-defined]
+    monitor.before(seen(3))
+    held = monitor.after(DONE)
+    assert held is not None and (held.outcome, held.hold) == (Outcome.HOLD, Hold.INTERNAL)
+
+
 def test_what_cannot_be_believed_is_looked_at_once_more_and_then_holds() -> None:
     monitor, _ = seeing(Limits())
     first = monitor.before(seen(13))

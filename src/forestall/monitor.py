@@ -198,6 +198,11 @@ class Monitor:
             run.mark()
             assert run.last is not None
             told = replace(outcome, reason="")  # it may name what the robot has not seen
+            if outcome.status is not SkillStatus.REFUSED:
+                try:
+                    self._parts.acted(run.last.subtask)
+                except PartError as error:
+                    return self._moments.hold_for(error, run.last.subtask)
             if (held := self._moments.too_many(run, run.last.subtask)) is not None:
                 return held
             if self._strategy.looks_after is not LooksAfter.SUBTASK:

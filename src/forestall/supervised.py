@@ -155,6 +155,16 @@ class SupervisedParts:
             "perceiver", lambda: perceive(observation), "perceive", gives=SceneGraph
         )
 
+    def acted(self, subtask: Subtask) -> None:
+        """A skill was carried out.
+
+        Raises:
+            PartError: the perceiver failed or was late.
+        """
+        told = getattr(self._perceiver, "acted", None)
+        if told is not None:
+            self._calls.call("perceiver", lambda: told(subtask), "perceive")
+
     @property
     def domain(self) -> Domain:
         """What plans are checked against and decisions are told in."""

@@ -5,6 +5,8 @@ Named in `registry`, called through `parts`; calls perception and embeddings.
 
 from __future__ import annotations
 
+from functools import partial
+
 from forestall.assembly.registry import default
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.domain.load import shipped
@@ -19,6 +21,7 @@ from forestall.perception.learned import LearnedStateEstimator
 from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
+from forestall.planning.altered import altered
 from forestall.seams import ImageTextEncoder, OracleView, Parts
 
 _PERCEPTION, _SCORE = PerceptionConfig(), ScoreConfig()
@@ -82,6 +85,8 @@ def graph(
 ) -> GraphPerceiver:
     """RGB-D to one scene graph over the episode.
 
+    States that a skill may have changed are believed again when they are read again.
+
     Args:
         parts: segmenter, states, encoder, domain.
         feature: what a node's feature encodes; "image" keeps the look of every object.
@@ -97,6 +102,7 @@ def graph(
         scope,
         image_encoder=look_encoder(parts) if feature is Feature.IMAGE else None,
         watch=watch or WatchConfig(),
+        alters=partial(altered, domain=parts.domain),
     )
 
 

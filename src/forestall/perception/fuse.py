@@ -7,7 +7,7 @@ say about remembered places, and `support.py`, `relations.py`, `blocking.py` for
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -59,6 +59,12 @@ class SceneMemory:
         self._hands: tuple[GripperState, ...] = ()
         self._relations: list[Relation] = []
         self.forgotten: tuple[str, ...] = ()  # in the newest observation, for want of room
+
+    def doubt(self, states: Iterable[tuple[str, str]]) -> None:
+        """Forget what was read of some (thing, attribute), until it is read again."""
+        for name, attribute in states:
+            if name in self.tracks:
+                self.tracks[name].states.pop(attribute, None)
 
     # --- integration ----------------------------------------------------------------------------
 

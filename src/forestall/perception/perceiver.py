@@ -7,7 +7,7 @@ each frame and `fuse.py` once for each observation.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from forestall.domain.model import Domain
@@ -38,6 +38,9 @@ from forestall.types.plan import Subtask
 
 _GATE = GateConfig()
 
+Alters = Callable[[SceneGraph, Subtask], Iterable[tuple[str, str]]]
+"""What is believed, what was carried out → (thing, attribute) that it may have changed."""
+
 
 class GraphPerceiver:
     """Implements the Perceiver Protocol.
@@ -52,6 +55,7 @@ class GraphPerceiver:
             an image embedding); without it nodes have none.
         gate: what observations cannot be; None lets everything in.
         watch: what may change from one observation to the next; by default everything may.
+        alters: what a skill may have changed; without it a state is believed until it is read anew.
     """
 
     def __init__(
@@ -65,6 +69,7 @@ class GraphPerceiver:
         image_encoder: ImageEncoder | None = None,
         gate: GateConfig | None = _GATE,
         watch: WatchConfig | None = None,
+        alters: Alters | None = None,
     ) -> None:
         self._segmenter = segmenter
         self._estimator = state_estimator
@@ -73,6 +78,7 @@ class GraphPerceiver:
         self._scope = scope_config or ScopeConfig()
         self._image_encoder = image_encoder
         self._gate = gate
+        self._alters = alters
         self._watch = None if watch is None else SenseWatch(watch, gate)
         self.findings: tuple[Finding, ...] = ()
         self._memory = SceneMemory(domain, self._config)
@@ -107,6 +113,11 @@ class GraphPerceiver:
             names = ", ".join(self._memory.forgotten)
             self.findings += (Finding("forgotten", f"no room to remember {names}", refuses=False),)
         return self._memory.graph()
+
+    def acted(self, subtask: Subtask) -> None:
+        """A skill was carried out: what it may have changed is not known until it is read again."""
+        if self._alters is not None:
+            self._memory.doubt(self._alters(self._memory.graph(), subtask))
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
         """The part of a graph that concerns a (grounded) subtask, with its subtask node."""

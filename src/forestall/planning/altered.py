@@ -1,0 +1,35 @@
+"""What a skill may have changed, by the domain's model: states that are no longer known by memory.
+
+Called by the perceiver, through the callable that assembly gives it; calls the execution of skills.
+"""
+
+from __future__ import annotations
+
+from forestall.domain.model import Domain
+from forestall.planning.execute import Refusal, apply
+from forestall.planning.validate import observed
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Subtask
+
+
+def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[tuple[str, str], ...]:
+    """States that are others after a skill, as far as the model knows what is seen.
+
+    What it would bring about is not said: it may have failed, or the model may be wrong. A skill
+    that the domain lacks, or that could not run from what is seen, changes nothing that is known.
+
+    Returns:
+        (thing, attribute) in order; processes that the skill sets off are among what changes.
+    """
+    if subtask.skill not in domain.skills:
+        return ()
+    before = observed(graph, domain)
+    after = apply(before.copy(), subtask)
+    if isinstance(after, Refusal):
+        return ()
+    return tuple(
+        (node.id, attribute)
+        for node in graph.nodes
+        for attribute, _ in node.states
+        if before.value(node.id, attribute) != after.value(node.id, attribute)
+    )
