@@ -7,6 +7,7 @@ Where the narrowed problem has no plan the planner takes `everything`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from forestall.deadline import Deadline
@@ -35,6 +36,8 @@ MANY = 12
 """Of more bindings than this only those are looked at for which most holds already."""
 GROUPS = 4
 """How many categories of things are tried for one open parameter."""
+NEAR_BY_M = 0.8
+"""Of supports that lie no farther apart than this none is nearer than the other."""
 SUPPORTS = 2
 """How many supports are kept for putting things away."""
 
@@ -95,8 +98,18 @@ def _map(state: State) -> list[str]:
 
 
 def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[str]) -> list[str]:
-    """Supports in order of preference: room first, not where something is to be cleared."""
+    """Supports in order of preference: room, not where something is to be cleared, near by."""
     domain = state.domain
+    near = [x for x in kept if domain.is_a(state.kinds[x], domain.roles.movable)]
+    beside = {state.root(x) for x in near}
+    spots = [state.where[x] for x in near if x in state.where]
+
+    def away(name: str) -> float:
+        """How many ways of an arm's length it is from what may be moved."""
+        if name in beside or name not in state.where or not spots:
+            return 0.0
+        return min(math.dist(state.where[name], s) for s in spots) // NEAR_BY_M
+
     roots = {state.root(x) for x in avoid}
     order = domain.roles.rest
     found = []
@@ -108,6 +121,7 @@ def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[
                 name in shunned,
                 name in state.crowded,
                 name in roots,
+                away(name),
                 ranks[0],
                 name not in kept,
             )

@@ -20,6 +20,7 @@ from forestall.planning.planner import Planned, plan_goal, plan_to
 from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
+from forestall.planning.thrift import thrifty
 from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
 from forestall.replanning.hidden import hiding_places, sought
 from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
@@ -261,24 +262,28 @@ class PlannerReplanner:
         rest: int,
         wanted: Sequence[Literal],
     ) -> Replan:
-        """The plan without pairs of steps that undo each other and that nothing asks for.
+        """The plan in less of the robot's time, without steps that nothing asks for.
 
         What must change still does before the old plan, its last `rest` steps, is taken up again.
         """
         assert found.plan is not None
         steps, best = found.plan.subtasks, found
-        restored = _restored(state, steps, len(steps) - rest, wanted)
+        shortest, mine = steps, len(steps) - rest
+        restored = _restored(state, steps, mine, wanted)
 
         def accepts(shorter: tuple[Subtask, ...], own: int) -> bool:
-            nonlocal best
+            nonlocal best, shortest, mine
             if not restored <= _restored(state, shorter, own, wanted):
                 return False
             accepted = self._checked(attempts, context, state, shorter)
-            best = accepted or best
+            if accepted is not None:
+                best, shortest, mine = accepted, shorter, own
             return accepted is not None
 
         with suppress(TimeUp):  # the plan as it is will do
-            pruned(state, steps, len(steps) - rest, accepts)
+            pruned(state, steps, mine, accepts)
+            if thrifty(state, shortest, mine, accepts, _stands_at(context)) != steps:
+                pruned(state, shortest, mine, accepts)
         return best
 
     def _failed(self, attempts: _Attempts, state: State, wanted: list[Literal]) -> Replan:
@@ -332,6 +337,13 @@ def _rests(
             bound[kind] = name
     named = tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
     return (named,) if named == rest else (named, rest)
+
+
+def _stands_at(context: BoundaryContext) -> tuple[float, float] | None:
+    """Where the robot stands, as far as it says so."""
+    if context.observation is None:
+        return None
+    return context.observation.robot_position_world_m[:2]
 
 
 def _restored(
