@@ -14,10 +14,8 @@ from forestall.planning.state import State
 from forestall.planning.validate import Trace
 from forestall.types.plan import Subtask
 
-REACH_M = 0.8
-"""What is no farther from where the robot works than this it reaches from there."""
 ARM_M = 1.6
-"""The same of what is handled at one place: what stands on it, or works on it."""
+"""What is handled at one place and is no farther than this is reached from where the robot is."""
 UNKNOWN_M = 1.5
 """How far it is between two places of which nobody knows where they are."""
 
@@ -27,25 +25,28 @@ Aim = tuple[str, Spot | None]
 
 
 def robot_time_s(trace: Trace, start: Spot | None = None) -> float:
-    """Seconds that what ran of a plan takes.
+    """Seconds that what ran of a plan takes; arguments as those of `times_s`."""
+    return sum(times_s(trace, start))
+
+
+def times_s(trace: Trace, start: Spot | None = None) -> list[float]:
+    """Seconds for each step that ran of a plan.
 
     Args:
         trace: of the plan.
         start: where the robot stands at first, x and y in metres; None: the first way is free.
     """
     first = trace.states[0]
-    domain, total_s = first.domain, 0.0
+    domain, found = first.domain, []
     at: Aim | None = None if start is None else ("", start)
     for state, step in zip(trace.states, trace.meant, strict=False):
         skill = domain.skill(step.skill)
-        to = aim(first, state, step)
+        to, ways_s = aim(first, state, step), 0.0
         if to is not None:
             ways_s = 0.0 if at is None else way_s(domain, at, to, skill.drives)
-            total_s += ways_s
             at = to if ways_s or at is None else at
-        if not skill.drives:
-            total_s += skill.duration_s
-    return total_s
+        found.append(ways_s + (0.0 if skill.drives else skill.duration_s))
+    return found
 
 
 def way_s(domain: Domain, one: Aim, other: Aim, always: bool = False) -> float:
@@ -58,7 +59,7 @@ def way_s(domain: Domain, one: Aim, other: Aim, always: bool = False) -> float:
         always: whether it drives, too, where it reaches that from where it is.
     """
     way_m = _apart_m(one, other)
-    if not always and way_m <= REACH_M:
+    if not always and one[0] == other[0] and way_m <= ARM_M:
         return 0.0
     driving = domain.driving()
     turns_s = 0.0 if driving is None else driving.duration_s
@@ -92,6 +93,5 @@ def spot(first: State, state: State, name: str) -> Spot | None:
 
 def _apart_m(one: Aim, other: Aim) -> float:
     if one[1] is not None and other[1] is not None:
-        way_m = math.dist(one[1], other[1])
-        return 0.0 if one[0] == other[0] and way_m <= ARM_M else way_m
+        return math.dist(one[1], other[1])
     return 0.0 if one[0] == other[0] else UNKNOWN_M

@@ -15,7 +15,7 @@ from forestall.domain.formula import literals
 from forestall.domain.model import FACING, Domain
 from forestall.planning.driving import landmark_of
 from forestall.planning.needless import Accepts, content, unsafe
-from forestall.planning.robot_time import Aim, Spot, aim, robot_time_s, way_s
+from forestall.planning.robot_time import Aim, Spot, aim, times_s, way_s
 from forestall.planning.state import State
 from forestall.planning.validate import Trace, run
 from forestall.types.plan import Subtask
@@ -26,7 +26,7 @@ TRIES = 4
 """How many of the most promising changes are tried before it is left at that."""
 ROUNDS = 6
 """How many changes a plan can get."""
-DANGER = 0.5
+DANGER = 1.0
 """What a second with something dangerous going on counts, beside that second itself."""
 
 
@@ -47,12 +47,10 @@ class _Unit:
 
 def cost_s(trace: Trace, start: Spot | None = None) -> float:
     """What a plan costs: the robot's time, and that with something dangerous going on again."""
-    risky = sum(
-        trace.states[0].domain.skill(step.skill).duration_s or 1.0
-        for step, before in zip(trace.meant, trace.states, strict=False)
-        if unsafe(before)
+    return sum(
+        time_s * (1.0 + DANGER * bool(unsafe(before)))
+        for time_s, before in zip(times_s(trace, start), trace.states, strict=False)
     )
-    return robot_time_s(trace, start) + DANGER * risky
 
 
 def thrifty(
