@@ -268,7 +268,7 @@ def attempt(case: Repair, config: SearchConfig | None = None) -> tuple[Replan, P
 
 def test_what_the_old_plan_puts_down_again_is_not_picked_up_in_between() -> None:
     case = REPAIRS["wine in the bowl, lettuce in hand"]
-    answer, rest = attempt(case)
+    answer, _ = attempt(case)
     assert answer.plan is not None
     put_down = [s for s in answer.plan if s.skill == "put_on"]
     assert [category_of(s.args[0]) for s in put_down].count("Lettuce") == 1

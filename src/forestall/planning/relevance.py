@@ -84,7 +84,7 @@ def narrowed(
         closure.keep(_map(state))
         for part in dict.fromkeys(p for goal in goals for p in goal):
             closure.want(part)
-    chosen = _supports(state, closure.kept, closure.cleared, shunned)[:SUPPORTS]
+    chosen = _supports(state, closure.kept, closure.cleared, shunned)
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
     return Universe(things, closure.made, frozenset(closure.purposeful), tuple(chosen))
@@ -98,7 +98,7 @@ def _map(state: State) -> list[str]:
 
 
 def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[str]) -> list[str]:
-    """Supports in order of preference: room, not where something is to be cleared, near by."""
+    """The best supports: room, not where something is to be cleared, near by."""
     domain = state.domain
     near = [x for x in kept if domain.is_a(state.kinds[x], domain.roles.movable)]
     beside = {state.root(x) for x in near}
@@ -126,7 +126,8 @@ def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[
                 name not in kept,
             )
             found.append((key, by_number(name), name))
-    return [name for _, _, name in sorted(found)]
+    best = sorted(found)[:SUPPORTS]
+    return [name for _, _, name in sorted(best, key=lambda f: (f[0][:-1], f[1]))]
 
 
 class _Closure:
