@@ -219,7 +219,8 @@ def _passing(domain: Domain) -> frozenset[tuple[str, str]]:
     """Values of attributes that some skill or process puts an end to."""
     found: frozenset[tuple[str, str]] | None = domain.__dict__.get("_passing")
     if found is None:
-        effects = [e for s in (*domain.skills.values(), *domain.processes) for e in s.effects]
+        effects = [e for s in domain.skills.values() for e in s.effects]
+        effects += [e for p in domain.processes for e in p.effects]
         ends = {(f.predicate, f.value) for e in effects for f in e.facts}
         copied = {c.attribute for e in effects for c in e.copies}
         found = domain.__dict__["_passing"] = frozenset(
