@@ -69,12 +69,22 @@ def test_a_burner_that_is_off_during_a_detour_stays_off() -> None:
     assert needless_pairs(start(), plan) == ((0, 1),)
 
 
+def test_a_step_that_changes_nothing_is_needless_by_itself() -> None:
+    plan = steps("close_obj(Fridge-1)", "open_obj(Fridge-1)")
+    assert needless_pairs(start(), plan) == ((0, 0),)
+
+
+def test_what_is_turned_on_by_one_name_and_off_by_another_is_one_pair() -> None:
+    plan = steps("toggle_on(StoveKnob-1)", "toggle_off(StoveBurner-1)")
+    assert needless_pairs(start(), plan) == ((0, 1),)
+
+
 def test_a_plan_that_does_not_run_has_none() -> None:
     plan = steps("open_obj(Fridge-1)", "close_obj(Fridge-1)", "pick_up(Mug-1)")
     assert needless_pairs(start(), plan) == ()
 
 
-def test_pairs_go_where_that_is_accepted_and_not_from_the_old_plan_alone() -> None:
+def test_pairs_go_where_that_is_accepted_from_repair_and_old_plan() -> None:
     plan = steps(*PUT_AND_TAKEN)
     asked: list[tuple[int, int]] = []
 
@@ -85,5 +95,5 @@ def test_pairs_go_where_that_is_accepted_and_not_from_the_old_plan_alone() -> No
     left = pruned(start(), plan, 9, accepts)
     assert len(left) == 9 and asked == [(9, 7)]
     assert needless_pairs(start(), left) == ()
-    assert pruned(start(), plan, 5, accepts) == plan
+    assert pruned(start(), plan, 5, accepts) == left and asked[-1] == (9, 4)
     assert pruned(start(), plan, 9, lambda shorter, own: False) == plan

@@ -6,11 +6,17 @@ from typing import Any
 
 from forestall import Goal, Literal, Monitor, Outcome, Plan, Subtask, Task
 from forestall.domain.load import shipped
+from forestall.domain.looked import looked_into, not_there
+from forestall.planning.validate import GraphValidator
 from forestall.replanning.hidden import hiding_places, sought
+from forestall.replanning.searching import with_shutting, without
+from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.graph import SceneGraph
 from forestall.types.scene import SceneNeeds
 from forestall.types.symbolic import scene_graph
-from forestall.types.verdict import Reference
+from forestall.types.verdict import Diagnosis, Reference
+from planning import episodes
+from planning.corpus import PLANS
 
 DOMAIN = shipped("household")
 PLAN = Plan.parse(["pick_up(Egg)", "put_on(Egg, CounterTop)"])
@@ -50,6 +56,8 @@ class Kitchen:
         if step.skill == "open_obj":
             self.open[step.args[0]] = True
             self.opened.append(step.args[0])
+        elif step.skill == "close_obj":
+            self.open[step.args[0]] = False
         elif step.skill == "pick_up":
             self.egg_in = None
         elif step.skill == "put_on":
@@ -84,6 +92,54 @@ def test_where_demonstrations_had_it_comes_first() -> None:
     shown = scene_graph({"objects": ["Plate-1", last], "relations": [["Plate-1", "inside", last]]})
     reference = Reference("d", "t", 0, Subtask.parse("pick_up(Plate-1)"), 1.0, shown)
     assert hiding_places("Plate", scene, DOMAIN, [reference])[0] == last
+
+
+def test_of_places_as_likely_the_near_one_comes_first() -> None:
+    scene = scene_graph(
+        {
+            "objects": {
+                "Cabinet-1": {"open": "closed", "box": box(6)},
+                "Cabinet-2": {"open": "closed", "box": box(1)},
+                "Fridge-1": {"open": "closed", "box": box(9)},
+            }
+        }
+    )
+    assert hiding_places("Mug", scene, DOMAIN, (), (0, 0)) == ["Cabinet-2", "Cabinet-1", "Fridge-1"]
+    assert hiding_places("Mug", scene, DOMAIN, (), (9, 0))[0] == "Fridge-1"
+
+
+def test_what_holds_many_things_comes_before_what_holds_one() -> None:
+    assert hiding_places("Mug", graph("Microwave-1", "Cabinet-1"), DOMAIN, ())[0] == "Cabinet-1"
+
+
+def test_a_place_that_must_not_stay_open_is_shut_once_the_thing_is_out_of_it() -> None:
+    opening = Plan.parse(["navigate_to_obj(Fridge-1)", "open_obj(Fridge-1)"]).subtasks
+    shutting = Plan.parse(["navigate_to_obj(Fridge-1)", "close_obj(Fridge-1)"]).subtasks
+
+    def rest(*texts: str) -> list[str]:
+        left = Plan.parse(texts).subtasks
+        return [str(s) for s in with_shutting(left, opening, shutting, "Egg", DOMAIN)]
+
+    assert rest("navigate_to_obj(Egg)", "pick_up(Egg)", "put_on(Egg, CounterTop)") == [
+        "navigate_to_obj(Egg)", "pick_up(Egg)", "close_obj(Fridge-1)", "put_on(Egg, CounterTop)"
+    ]  # fmt: skip
+    shut_anyway = ("pick_up(Egg)", "close_obj(Fridge)")
+    assert rest(*shut_anyway) == list(shut_anyway)
+    opened_again = ("pick_up(Egg)", "open_obj(Fridge)", "close_obj(Fridge)")
+    assert rest(*opened_again) == [opened_again[0], "close_obj(Fridge-1)", *opened_again[1:]]
+    assert rest("crack_obj(Egg)")[1:] == [str(s) for s in shutting]
+
+
+def test_what_was_shut_early_is_not_shut_again() -> None:
+    shutting = Plan.parse(["navigate_to_obj(Fridge-1)", "close_obj(Fridge-1)"]).subtasks
+
+    def rest(*texts: str) -> list[str]:
+        return [str(s) for s in without(Plan.parse(texts).subtasks, shutting, DOMAIN)]
+
+    late = ("pick_up(Egg)", "navigate_to_obj(Fridge)", "close_obj(Fridge)", "navigate_to_obj(Egg)")
+    assert rest(*late) == ["pick_up(Egg)", "navigate_to_obj(Egg)"]
+    needed = ("open_obj(Fridge)", "close_obj(Fridge)")
+    assert rest(*needed) == list(needed)
 
 
 def test_what_is_in_sight_is_not_looked_for() -> None:
@@ -122,6 +178,7 @@ def test_it_is_found_wherever_it_is() -> None:
         assert kitchen.egg_in == "CounterTop", (place, kitchen.opened)
         assert monitor.finished
         assert kitchen.opened[-1] == place and len(set(kitchen.opened)) == len(kitchen.opened)
+        assert not kitchen.open["Fridge-1"], "no fridge is left open"
 
 
 def test_not_found_after_all_is_a_stated_end() -> None:
@@ -129,7 +186,9 @@ def test_not_found_after_all_is_a_stated_end() -> None:
     kitchen.open["nowhere"] = False
     monitor = play(kitchen)
     assert not monitor.finished
-    assert set(kitchen.opened) == {p for p in SHUT if DOMAIN.accepts(p, "Egg")}
+    accepting = {p for p in SHUT if DOMAIN.accepts(p, "Egg")}
+    assert set(kitchen.opened) == accepting and len(kitchen.opened) == len(accepting)
+    assert not kitchen.open["Fridge-1"]
 
 
 def test_where_the_goal_holds_already_nothing_is_done() -> None:
@@ -137,3 +196,19 @@ def test_where_the_goal_holds_already_nothing_is_done() -> None:
     monitor = play(kitchen)
     assert monitor.finished and kitchen.opened == []
     assert monitor.executed == () and len(monitor.plan) == 0
+
+
+def test_after_all_places_it_says_where_it_looked() -> None:
+    kitchen = Kitchen("nowhere")
+    kitchen.open = {"nowhere": False, **dict.fromkeys(SHUT, True)}
+    shown = kitchen.look()
+    wanted = (Literal.parse("located(Egg)"),)
+    seen = scene_graph({"objects": shown["objects"]})
+    looked = looked_into(seen, DOMAIN)
+    assert looked == set(SHUT)
+    facts = not_there("Egg", looked, DOMAIN)
+    context = episodes.context("store-egg", PLANS["store-egg"], 0, seen)
+    replanner = PlannerReplanner(GraphValidator(DOMAIN), DOMAIN)
+    answer = replanner.replan(context, Diagnosis("a cause", wanted, facts))
+    assert answer.plan is None
+    assert "Egg was looked for in Cabinet-1, Fridge-1, Microwave-1 and is not there" in answer.note

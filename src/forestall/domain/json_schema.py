@@ -43,7 +43,13 @@ def domain_schema() -> Schema:
                 "name": {**_TEXT, "description": "of the domain"},
                 "tags": {**_TEXTS, "description": "every tag that a category may have"},
                 "roles": _roles(),
-                "robot": _object({"hands": _TEXTS, "skills": _TEXTS}),
+                "robot": _object(
+                    {
+                        "hands": _TEXTS,
+                        "skills": _TEXTS,
+                        "speed_m_per_s": {**_NUMBER, "exclusiveMinimum": 0},
+                    }
+                ),
                 "run": {
                     **_NAMES,
                     "description": "kind of part -> the part of a run that says nothing else",

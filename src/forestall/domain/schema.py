@@ -244,7 +244,7 @@ class Skill:
         family: skills that do the same thing to different kinds of things.
         undoes: the fact that it is there to end; that it holds before is no need.
         done_when: where this holds the skill succeeds at once and changes nothing.
-        duration_s: how long it takes, driving apart.
+        duration_s: how long it takes, the way there apart; of one that only drives, its turns.
     """
 
     name: str
@@ -305,10 +305,17 @@ class SafetyRule:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """Hands by node id (none, one, two), and its skills where it has not all of them."""
+    """What the robot can do.
+
+    Args:
+        hands: by node id: none, one, two.
+        skills: where it has not all of them.
+        speed_m_per_s: how fast it drives, for what a plan takes.
+    """
 
     hands: tuple[str, ...] = ("gripper",)
     skills: tuple[str, ...] = ()
+    speed_m_per_s: float = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,6 +136,7 @@ class _Category(_Table):
 class _Robot(_Table):
     hands: Texts = []
     skills: Texts = []
+    speed_m_per_s: Annotated[Number, Field(gt=0)] = 0.5
 
 
 class _Domain(_Table):

@@ -32,7 +32,7 @@ def gathered(
             break
         if step.over is not None or not step.subtask.args:
             continue
-        place = _place(state, step.subtask.args[-1])
+        place = place_of(state, step.subtask.args[-1])
         near = [j for j in range(i - 1) if _at(state, steps[j]) == place]
         if place is None or not near or _at(state, steps[i - 1]) == place:
             continue
@@ -49,10 +49,10 @@ def _drives(state: State, steps: Sequence[Operator]) -> int:
 
 def _at(state: State, step: Operator) -> str | None:
     args = step.subtask.args
-    return _place(state, args[-1]) if args else None
+    return place_of(state, args[-1]) if args else None
 
 
-def _place(state: State, name: str) -> str | None:
+def place_of(state: State, name: str) -> str | None:
     """Where the robot stands to handle a thing; None for what does not exist yet."""
     if name not in state.kinds:
         return None
@@ -106,7 +106,7 @@ def with_driving(
         subject = over or (subtask.args[-1] if subtask.args else None)
         steps_here = [subtask]
         if subject is not None:
-            place = _place(state, subject)
+            place = place_of(state, subject)
             held = {h for _, h in state.in_hands()}
             if driving is not None and (place != where or over) and subject not in held:
                 landmark = over or landmark_of(state, subject)

@@ -200,8 +200,9 @@ class _Grounding:
         """Of equal steps the search takes the first: what is put away goes to a support first."""
         plan, names = binding
         several = [by_number(x) for x in names.values()]
-        away = any(x in self.universe.supports for x in list(names.values())[-1:])
-        return plan.rank, several[:-1], not away, several
+        supports = self.universe.supports
+        away = [supports.index(x) for x in list(names.values())[-1:] if x in supports]
+        return plan.rank, several[:-1], *(away or [len(supports)]), several
 
     # --- drafts ----------------------------------------------------------------------------------
 

@@ -8,25 +8,27 @@ dangerous state meanwhile: what is turned off before a detour and on again after
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 from forestall.planning.state import State
 from forestall.planning.validate import Trace, run
 from forestall.types.plan import Subtask
 
 Accepts = Callable[[tuple[Subtask, ...], int], bool]
-"""A shorter plan, and how many of its first steps are free to go → whether it will do."""
+"""Another plan, and how many of its first steps are the repair's own → whether it will do."""
 
 
 def needless_pairs(state: State, steps: Sequence[Subtask]) -> tuple[tuple[int, int], ...]:
     """Every needless pair of a plan by the places of its steps, the first ones first.
 
     Pairs are looked for one by one: of three steps of which any two could go, three pairs are said.
-    A plan that does not run has none.
+    A step that changes nothing and drives nowhere makes a pair with itself. A plan that does not
+    run has none.
     """
     whole = run(state, steps)
     if whole.refusal is not None:
         return ()
-    return tuple(pair for pair in _candidates(state, steps) if _needless(whole, steps, pair))
+    return tuple(pair for pair in _candidates(whole) if _needless(whole, steps, pair))
 
 
 def without(state: State, steps: Sequence[Subtask], pair: tuple[int, int]) -> tuple[int, ...]:
@@ -54,7 +56,7 @@ def pruned(
     Args:
         state: that it starts from.
         steps: of the plan, which runs.
-        own: how many at its beginning are free to go; a pair has one of them at least.
+        own: how many at its beginning are the repair; the others are what is left of an old plan.
         accepts: says whether a shorter plan will do.
     """
     left = tuple(steps)
@@ -62,8 +64,8 @@ def pruned(
         whole = run(state, left)
         if whole.refusal is not None:
             return left
-        for pair in _candidates(state, left):
-            if pair[0] < own and _needless(whole, left, pair):
+        for pair in _candidates(whole):
+            if _needless(whole, left, pair):
                 kept = without(state, left, pair)
                 shorter = tuple(left[k] for k in kept)
                 free = sum(k < own for k in kept)
@@ -74,50 +76,53 @@ def pruned(
             return left
 
 
-def _candidates(state: State, steps: Sequence[Subtask]) -> list[tuple[int, int]]:
-    """Two steps of different skills about one thing, the nearest ones first."""
-    acting = [k for k, s in enumerate(steps) if s.args and not _drives(state, s)]
+def content(state: State) -> frozenset[tuple[str, ...]]:
+    """Everything that holds; where the robot stands apart."""
+
+    def found() -> frozenset[tuple[str, ...]]:
+        values = ((*key, value) for key, value in state.values.items())
+        lost = ((name,) for name in state.lost)
+        return frozenset((*values, *state.facts, *state.kinds.items(), *lost))
+
+    return state.follow("content", found)
+
+
+def unsafe(state: State) -> frozenset[tuple[str, ...]]:
+    """What must never be so and is, whenever that is judged."""
+
+    def found() -> frozenset[tuple[str, ...]]:
+        return frozenset(
+            (rule.name, *sorted(names.values()))
+            for rule in state.domain.safety
+            for names in state.bindings(rule.variables, rule.never, {})
+        )
+
+    return state.follow("unsafe", found)
+
+
+def _candidates(whole: Trace) -> list[tuple[int, int]]:
+    """Two steps of which the second undoes something of the first, the nearest ones first."""
+    contents = [content(s) for s in whole.states]
+    added = [b - a for a, b in pairwise(contents)]
+    ended = [a - b for a, b in pairwise(contents)]
+    acting = [k for k, s in enumerate(whole.meant) if not _drives(whole.states[0], s)]
+    idle = [(k, k) for k in acting if not added[k] and not ended[k]]
     pairs = [
         (i, j)
         for i in acting
         for j in acting
-        if i < j and steps[i].skill != steps[j].skill and _one_thing(state, steps[i], steps[j])
+        if i < j and (added[i] & ended[j] or ended[i] & added[j])
     ]
-    return sorted(pairs, key=lambda pair: (pair[1] - pair[0], pair))
-
-
-def _one_thing(state: State, one: Subtask, other: Subtask) -> bool:
-    mine, theirs = set(state.matches(one.args[0])), set(state.matches(other.args[0]))
-    return one.args[0] == other.args[0] or bool(mine & theirs)
+    return idle + sorted(pairs, key=lambda pair: (pair[1] - pair[0], pair))
 
 
 def _needless(whole: Trace, steps: Sequence[Subtask], pair: tuple[int, int]) -> bool:
-    first, second = pair
-    before, done, undone = (_content(whole.states[k]) for k in (first, first + 1, second + 1))
-    if not (done - before) - undone and not (before - done) & undone:
-        return False
     kept = without(whole.states[0], steps, pair)
     trace = run(whole.states[0], [steps[k] for k in kept])
-    if trace.refusal is not None or _content(whole.final) != _content(trace.final):
+    if trace.refusal is not None or content(whole.final) != content(trace.final):
         return False
     after = zip(kept, trace.states[1:], strict=True)
-    return all(_unsafe(shorter) <= _unsafe(whole.states[k + 1]) for k, shorter in after)
-
-
-def _content(state: State) -> frozenset[tuple[str, ...]]:
-    """Everything that holds; where the robot stands apart."""
-    values = ((*key, value) for key, value in state.values.items())
-    lost = ((name,) for name in state.lost)
-    return frozenset((*values, *state.facts, *state.kinds.items(), *lost))
-
-
-def _unsafe(state: State) -> frozenset[tuple[str, ...]]:
-    """What must never be so and is, whenever that is judged."""
-    return frozenset(
-        (rule.name, *sorted(names.values()))
-        for rule in state.domain.safety
-        for names in state.bindings(rule.variables, rule.never, {})
-    )
+    return all(unsafe(shorter) <= unsafe(whole.states[k + 1]) for k, shorter in after)
 
 
 def _drives(state: State, step: Subtask) -> bool:

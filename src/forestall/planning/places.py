@@ -37,6 +37,16 @@ def crowded(graph: SceneGraph, domain: Domain) -> frozenset[str]:
     return frozenset(x for x, a in covered.items() if x in area_m2 and a > CROWDED * area_m2[x])
 
 
+def positions(graph: SceneGraph) -> dict[str, tuple[float, float]]:
+    """Where things are on the floor plan, those of which that is known."""
+    found = {}
+    for node in graph.nodes:
+        centre = node.box_m.centre if node.box_m is not None else node.centroid_m
+        if centre is not None:
+            found[node.id] = centre[:2]
+    return found
+
+
 def places(graph: SceneGraph, state: State) -> dict[str, Place]:
     """One place for each thing: the innermost of several, the ground last, no cycles."""
     domain = state.domain

@@ -7,6 +7,7 @@ Where the narrowed problem has no plan the planner takes `everything`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from forestall.deadline import Deadline
@@ -35,6 +36,8 @@ MANY = 12
 """Of more bindings than this only those are looked at for which most holds already."""
 GROUPS = 4
 """How many categories of things are tried for one open parameter."""
+NEAR_BY_M = 0.8
+"""Of supports that lie no farther apart than this none is nearer than the other."""
 SUPPORTS = 2
 """How many supports are kept for putting things away."""
 
@@ -81,7 +84,7 @@ def narrowed(
         closure.keep(_map(state))
         for part in dict.fromkeys(p for goal in goals for p in goal):
             closure.want(part)
-    chosen = _supports(state, closure.kept, closure.cleared, shunned)[:SUPPORTS]
+    chosen = _supports(state, closure.kept, closure.cleared, shunned)
     closure.keep(chosen)
     things = tuple(sorted((x for x in closure.kept if x not in state.lost), key=by_number))
     return Universe(things, closure.made, frozenset(closure.purposeful), tuple(chosen))
@@ -95,8 +98,18 @@ def _map(state: State) -> list[str]:
 
 
 def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[str]) -> list[str]:
-    """Supports in order of preference: room first, not where something is to be cleared."""
+    """The best supports: room, not where something is to be cleared, near by."""
     domain = state.domain
+    near = [x for x in kept if domain.is_a(state.kinds[x], domain.roles.movable)]
+    beside = {state.root(x) for x in near}
+    spots = [state.where[x] for x in near if x in state.where]
+
+    def away(name: str) -> float:
+        """How many ways of an arm's length it is from what may be moved."""
+        if name in beside or name not in state.where or not spots:
+            return 0.0
+        return min(math.dist(state.where[name], s) for s in spots) // NEAR_BY_M
+
     roots = {state.root(x) for x in avoid}
     order = domain.roles.rest
     found = []
@@ -108,11 +121,13 @@ def _supports(state: State, kept: set[str], avoid: set[str], shunned: frozenset[
                 name in shunned,
                 name in state.crowded,
                 name in roots,
+                away(name),
                 ranks[0],
                 name not in kept,
             )
             found.append((key, by_number(name), name))
-    return [name for _, _, name in sorted(found)]
+    best = sorted(found)[:SUPPORTS]
+    return [name for _, _, name in sorted(best, key=lambda f: (f[0][:-1], f[1]))]
 
 
 class _Closure:

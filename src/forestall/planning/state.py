@@ -6,7 +6,7 @@ replanner. It answers every formula of the domain with yes or no.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from itertools import product
 from typing import TypeVar
 
@@ -15,7 +15,7 @@ from forestall.domain.formula import Formula, Parameter
 from forestall.domain.model import FACING, LOCATED, Domain
 from forestall.domain.schema import Category, PredicateKind
 from forestall.planning.asked import Asked
-from forestall.planning.places import Place, crowded, places
+from forestall.planning.places import Place, crowded, places, positions
 from forestall.types.facts import Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
 
@@ -40,11 +40,12 @@ class State:
         hidden: containers whose inside was not observed and is assumed empty.
         crowded: supports with little free area, as far as the boxes of the graph tell.
         assumed: facts that were not observed and are taken from the domain.
+        where: things whose place was seen → x, y in metres at the start; shared by all copies.
     """
 
     __slots__ = (
         "_asked", "_done", "_index", "_kind_index", "assumed", "at", "changed", "crowded", "domain",
-        "facts", "hidden", "kinds", "lost", "values",
+        "facts", "hidden", "kinds", "lost", "values", "where",
     )  # fmt: skip
 
     def __init__(
@@ -71,6 +72,7 @@ class State:
             self.add(fact)
         self.at, self.lost, self.hidden = at, lost, hidden
         self.crowded, self.assumed = crowded, assumed
+        self.where: Mapping[str, tuple[float, float]] = {}
 
     @classmethod
     def from_graph(cls, graph: SceneGraph, domain: Domain) -> State:
@@ -111,6 +113,7 @@ class State:
             assumed |= {Literal(roles.vacant, (h,)) for h in state.hidden}
         state.assumed = frozenset(assumed)
         state.crowded = crowded(graph, domain)
+        state.where = positions(graph)
         return state
 
     def copy(self) -> State:
@@ -122,7 +125,7 @@ class State:
         other.changed, other._asked, other._done = set(self.changed), None, {}
         other._kind_index = self._kind_index
         other.at, other.lost, other.hidden = self.at, self.lost, self.hidden
-        other.crowded, other.assumed = self.crowded, self.assumed
+        other.crowded, other.assumed, other.where = self.crowded, self.assumed, self.where
         return other
 
     # --- changes ---------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from forestall.deadline import Deadline, TimeUp
+from forestall.domain.looked import searched
 from forestall.domain.model import Domain
 from forestall.planning.goals import alternatives
 from forestall.planning.needless import pruned
@@ -20,9 +21,11 @@ from forestall.planning.planner import Planned, plan_goal, plan_to
 from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
+from forestall.planning.thrift import thrifty
 from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
-from forestall.replanning.hidden import hiding_places, sought
+from forestall.replanning.hidden import IN_VAIN, hiding_places, in_vain, sought
 from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
+from forestall.replanning.searching import to_shut, with_shutting, without
 from forestall.seams import PlanValidator
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, Subtask
@@ -100,8 +103,11 @@ class PlannerReplanner:
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
         lost = sought(diagnosis.must_change, context.graph)
-        if lost and (search := self._search(attempts, context, lost)) is not None:
-            return search
+        if lost:
+            search = self._search(attempts, context, lost, diagnosis.must_stay)
+            if search is not None:
+                return search
+            attempts.notes = in_vain(lost, diagnosis.must_stay, self.domain)
         wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.domain)]
         if not wanted:
             names = ", ".join(map(str, diagnosis.must_change))
@@ -109,7 +115,8 @@ class PlannerReplanner:
         state = observed(context.graph, self.domain)
         attempts.refused = unexplained(state, context.refused)
         repairs: list[Planned] = []
-        for repair in self._repairs(attempts, state, context, wanted, diagnosis.must_stay):
+        stay = [x for x in diagnosis.must_stay if not set(lost) & set(x.args)]
+        for repair in self._repairs(attempts, state, context, wanted, stay):
             rests = _rests(context, state, bool(repair.subtasks))
             if context.refused and repair.final and not unmet((repair.final,), context.task.goal):
                 rests = ((), *rests)  # what was wanted was all that is left to do
@@ -138,7 +145,11 @@ class PlannerReplanner:
         return self._failed(attempts, state, wanted)
 
     def _search(
-        self, attempts: _Attempts, context: BoundaryContext, lost: tuple[str, ...]
+        self,
+        attempts: _Attempts,
+        context: BoundaryContext,
+        lost: tuple[str, ...],
+        known: Sequence[Literal],
     ) -> Replan | None:
         """Open a shut place in which something may be that nobody has seen; None: there is none.
 
@@ -151,15 +162,44 @@ class PlannerReplanner:
         state = observed(context.graph, self.domain)
         attempts.refused = unexplained(state, context.refused)
         for name in lost:
-            for place in hiding_places(name, context.graph, self.domain, context.references):
-                opened = Literal(shut, (place,), "false")
-                for kept in (hand(state, [opened]), []):
-                    planned = self._to(attempts, state, (opened, *kept))
-                    found = self._checked(attempts, context, state, planned.subtasks, Goal(""))
-                    if planned.subtasks and found is not None and found.plan is not None:
-                        plan = Plan((*found.plan.subtasks, *context.remaining()), found.plan.goal)
-                        note = f"looking for {name} in {place}"
-                        return replace(found, plan=plan, note=note, looking_for=lost)
+            empty = searched(name, known, self.domain)
+            places = hiding_places(
+                name, context.graph, self.domain, context.references, _stands_at(context)
+            )
+            shutting = self._to(attempts, state, to_shut(state, empty)).subtasks if empty else ()
+            for place in (p for p in places if p not in empty):
+                found = self._look_into(attempts, context, state, place, shutting)
+                if found is None or found.plan is None:
+                    continue
+                after = run(state, found.plan.subtasks).final
+                again = to_shut(after, (place,))
+                closing = self._to(attempts, after, again).subtasks if again else ()
+                rest = without(context.remaining(), shutting, self.domain)
+                opening = found.plan.subtasks
+                rest = with_shutting(rest, opening, closing, name, self.domain)
+                plan = Plan((*opening, *rest), found.plan.goal)
+                note = f"looking for {name} in {place}"
+                return replace(found, plan=plan, note=note, looking_for=lost)
+        return None
+
+    def _look_into(
+        self,
+        attempts: _Attempts,
+        context: BoundaryContext,
+        state: State,
+        place: str,
+        shutting: tuple[Subtask, ...],
+    ) -> Replan | None:
+        """Steps that open a place, after those that shut others."""
+        opened = Literal(self.domain.roles.shut or "", (place,), "false")
+        start = run(state, shutting).final
+        for kept in (hand(start, [opened]), []):
+            planned = self._to(attempts, start, (opened, *kept))
+            if planned.subtasks:
+                steps = (*shutting, *planned.subtasks)
+                found = self._checked(attempts, context, state, steps, Goal(""))
+                if found is not None:
+                    return found
         return None
 
     def _repairs(
@@ -261,32 +301,37 @@ class PlannerReplanner:
         rest: int,
         wanted: Sequence[Literal],
     ) -> Replan:
-        """The plan without pairs of steps that undo each other and that nothing asks for.
+        """The plan in less of the robot's time, without steps that nothing asks for.
 
         What must change still does before the old plan, its last `rest` steps, is taken up again.
         """
         assert found.plan is not None
         steps, best = found.plan.subtasks, found
-        restored = _restored(state, steps, len(steps) - rest, wanted)
+        shortest, mine = steps, len(steps) - rest
+        restored = _restored(state, steps, mine, wanted)
 
         def accepts(shorter: tuple[Subtask, ...], own: int) -> bool:
-            nonlocal best
+            nonlocal best, shortest, mine
             if not restored <= _restored(state, shorter, own, wanted):
                 return False
             accepted = self._checked(attempts, context, state, shorter)
-            best = accepted or best
+            if accepted is not None:
+                best, shortest, mine = accepted, shorter, own
             return accepted is not None
 
         with suppress(TimeUp):  # the plan as it is will do
-            pruned(state, steps, len(steps) - rest, accepts)
+            pruned(state, steps, mine, accepts)
+            if thrifty(state, shortest, mine, accepts, _stands_at(context)) != steps:
+                pruned(state, shortest, mine, accepts)
         return best
 
     def _failed(self, attempts: _Attempts, state: State, wanted: list[Literal]) -> Replan:
         hands = self.domain.robot.hands
         lost = [a for x in wanted for a in x.args if a not in hands and _is_lost(state, a)]
         if lost:
+            vain = [n for n in attempts.notes if n.endswith(IN_VAIN)]
             note = f"{', '.join(dict.fromkeys(lost))}: its place is not known"
-            return self._ended(attempts, ReplanOutcome.UNSOLVABLE, note)
+            return self._ended(attempts, ReplanOutcome.UNSOLVABLE, "; ".join((*vain, note)))
         note = "; ".join(dict.fromkeys((*no_other(state, attempts.refused), *attempts.notes)))
         if attempts.timed_out:
             return self._ended(attempts, ReplanOutcome.TIMEOUT, note)
@@ -332,6 +377,13 @@ def _rests(
             bound[kind] = name
     named = tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
     return (named,) if named == rest else (named, rest)
+
+
+def _stands_at(context: BoundaryContext) -> tuple[float, float] | None:
+    """Where the robot stands, as far as it says so."""
+    if context.observation is None:
+        return None
+    return context.observation.robot_position_world_m[:2]
 
 
 def _restored(

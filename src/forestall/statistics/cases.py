@@ -42,7 +42,7 @@ LONG_UNDISTURBED = "long-undisturbed"
 CASE_SETS = ("robofail", "irreversible", UNDISTURBED, "harmless")
 
 FURTHER_SETS = (
-    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes"),
+    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes", "hidden"),
     *(LONG, LONG_UNDISTURBED),
 )
 

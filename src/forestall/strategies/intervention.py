@@ -10,6 +10,7 @@ import time
 from dataclasses import dataclass, field, replace
 
 from forestall.domain.formula import TRUE as ALWAYS
+from forestall.domain.looked import looked_into, not_there
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import truth
 from forestall.seams import PlanValidator, Replanner
@@ -70,6 +71,7 @@ class Intervention:
         self._resume_left = 0
         self._attempts: dict[tuple[Literal, ...], int] = {}
         self._sought: frozenset[str] = frozenset()
+        self._looked: frozenset[str] = frozenset()
 
     def begin(self, context: BoundaryContext) -> None:
         """To be called before every subtask: forgets the last episode when a new one begins."""
@@ -77,7 +79,8 @@ class Intervention:
             self._resume_left = len(context.plan)
             if context.index == 0:
                 self._attempts.clear()
-                self._sought = frozenset()
+                self._sought = self._looked = frozenset()
+        self._looked |= looked_into(context.graph, self._validator.domain)
 
     def repairs(self, context: BoundaryContext) -> bool:
         """Whether the subtask belongs to a repair, for which there is no demonstration."""
@@ -204,7 +207,7 @@ class Intervention:
         if not context.task.goal.literals and self._brought_about(context):
             why = f"what {context.subtask} is to bring about holds already"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
-        replan = self._replanner.replan(context, diagnosis)
+        replan = self._replanner.replan(context, self._with_places(diagnosis))
         clock.lap("replan")
         if _is_the_old(replan.plan, context):  # what must change is nothing that planning knows of
             return self._no_plan(context, verdict, diagnosis, replan, clock)
@@ -222,6 +225,14 @@ class Intervention:
                 Decision.LOOK_AGAIN, verdict, diagnosis, replan, replan.note, clock.items()
             )
         return self._no_plan(context, verdict, diagnosis, replan, clock)
+
+    def _with_places(self, diagnosis: Diagnosis) -> Diagnosis:
+        """A diagnosis with where the things that nobody sees are not: where one has looked."""
+        lost = [x.args[0] for x in diagnosis.must_change if x.predicate == LOCATED]
+        domain = self._validator.domain
+        empty = [f for name in lost for f in not_there(name, self._looked, domain)]
+        must_stay = tuple(dict.fromkeys((*diagnosis.must_stay, *empty)))
+        return replace(diagnosis, must_stay=must_stay) if empty else diagnosis
 
     def _brought_about(self, context: BoundaryContext) -> bool:
         """Whether everything holds already that the subtask does whatever else is so."""

@@ -42,7 +42,8 @@ from forestall.types.task import Goal, Task
 
 SETS = (
     *("examples", "robofail", "irreversible", "harmless"),
-    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes", "long"),
+    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes", "hidden"),
+    "long",
 )
 """Sets of shipped scenarios; each but the first is a folder of its own (docs/experiments.md)."""
 

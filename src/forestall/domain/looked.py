@@ -1,0 +1,41 @@
+"""Where somebody has looked, and what is said of a thing that was not there.
+
+Called by strategies, which see, and by the replanner, which looks elsewhere; calls `truth`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from forestall.domain.model import Domain
+from forestall.domain.truth import is_shut
+from forestall.types.facts import Literal, Truth
+from forestall.types.graph import SceneGraph, Seen
+
+
+def looked_into(graph: SceneGraph, domain: Domain) -> frozenset[str]:
+    """Places that can be shut and whose inside is in sight."""
+    return frozenset(
+        n.id
+        for n in graph.nodes
+        if n.seen is Seen.VISIBLE and n.id not in graph.hidden and domain.encloses(n.category)
+        and is_shut(domain, n.category, dict(n.states)) is Truth.FALSE
+    )  # fmt: skip
+
+
+def not_there(name: str, places: Iterable[str], domain: Domain) -> tuple[Literal, ...]:
+    """That a thing is in none of some places."""
+    return tuple(
+        Literal(relation, (name, place), "false")
+        for place in sorted(places)
+        if (relation := domain.offers(place)) is not None
+    )
+
+
+def searched(name: str, facts: Sequence[Literal], domain: Domain) -> tuple[str, ...]:
+    """The places in which a thing is not, by what `not_there` gave."""
+    return tuple(
+        x.args[1]
+        for x in facts
+        if x.value == "false" and x.predicate in domain.containing and x.args[0] == name
+    )

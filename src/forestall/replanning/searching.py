@@ -1,0 +1,96 @@
+"""The plan to look into one place: shut what was opened for nothing, open it, go on with the plan.
+
+Called by the replanner, which plans and checks the pieces; calls nothing that plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from forestall.domain.formula import literals
+from forestall.domain.model import Domain
+from forestall.planning.state import State
+from forestall.types.facts import Literal as Fact
+from forestall.types.facts import category_of
+from forestall.types.plan import Subtask
+
+
+def to_shut(state: State, places: Iterable[str]) -> list[Fact]:
+    """What is to be as usual again about places that no safety rule lets stay as they are."""
+    wanted, domain = set(places), state.domain
+    found: dict[Fact, None] = {}
+    for rule in domain.safety:
+        for names in state.bindings(rule.variables, rule.never, {}):
+            for literal, _ in literals(rule.never):
+                ground = literal.bind(names)
+                if ground.predicate in domain.attributes and ground.args[0] in wanted:
+                    usual = domain.default_states(state.kinds[ground.args[0]])
+                    found[Fact(ground.predicate, ground.args, usual[ground.predicate])] = None
+    return list(found)
+
+
+def with_shutting(
+    rest: Sequence[Subtask],
+    opening: Sequence[Subtask],
+    shutting: Sequence[Subtask],
+    thing: str,
+    domain: Domain,
+) -> tuple[Subtask, ...]:
+    """What is left of a plan, with a place shut again once the thing is out of it.
+
+    The robot stands there then; where the plan does not take the thing, it is shut at the end.
+    Where the plan shuts it anyway before it opens it again, nothing is put in.
+    """
+    acting = _acting(shutting, domain)
+    theirs = [s for s in rest if any(_same(s, one) for one in (*acting[-1:], *opening[-1:]))]
+    if not acting or (theirs and _same(theirs[0], acting[-1])):
+        return tuple(rest)
+    own = {thing, category_of(domain.canonical(thing))}
+    for k, step in enumerate(rest):
+        if own & set(_taken(step, domain)):
+            return (*rest[: k + 1], *acting, *rest[k + 1 :])
+    return (*rest, *shutting)
+
+
+def without(
+    rest: Sequence[Subtask], shutting: Sequence[Subtask], domain: Domain
+) -> tuple[Subtask, ...]:
+    """What is left of a plan when places are shut before that it would shut later."""
+    left = list(rest)
+    for done in _acting(shutting, domain):
+        about = [k for k, s in enumerate(left) if _acting((s,), domain) and _about(s, done)]
+        if not about or not _same(left[about[0]], done):
+            continue
+        k = about[0]
+        del left[k]
+        led = k > 0 and not _acting(left[k - 1 : k], domain)
+        if led and not _acting(left[k : k + 1], domain):
+            del left[k - 1]
+    return tuple(left)
+
+
+def _taken(step: Subtask, domain: Domain) -> tuple[str, ...]:
+    """What a step takes into a hand."""
+    names = domain.bound(step)
+    return tuple(
+        names.get(fact.args[0], fact.args[0])
+        for effect in domain.skill(step.skill).effects
+        for fact in effect.facts
+        if fact.predicate == domain.roles.holding and fact.value != "false"
+    )
+
+
+def _acting(steps: Sequence[Subtask], domain: Domain) -> tuple[Subtask, ...]:
+    return tuple(s for s in steps if not domain.skill(s.skill).drives)
+
+
+def _same(step: Subtask, other: Subtask) -> bool:
+    """Whether a step of a plan does what another does, by the name of a thing or of its kind."""
+    return step.skill == other.skill and _about(step, other)
+
+
+def _about(step: Subtask, other: Subtask) -> bool:
+    """Whether a step of a plan is about the things of another."""
+    return len(step.args) == len(other.args) and all(
+        a in (b, category_of(b)) for a, b in zip(step.args, other.args, strict=True)
+    )
