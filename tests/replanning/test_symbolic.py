@@ -134,6 +134,8 @@ REPAIRS: dict[str, Repair] = {
         "Pan-1 is dirty, StoveBurner-1 is on, Egg-1 on CounterTop-1",
         ("dirty(Pan-1)=clean",),
         """
+        navigate_to_obj(StoveBurner-1)
+        toggle_off(StoveBurner-1)
         navigate_to_obj(Pan-1)
         pick_up(Pan-1)
         navigate_to_obj(Sink-1)
@@ -253,7 +255,7 @@ def attempt(case: Repair, config: SearchConfig | None = None) -> tuple[Replan, P
         tuple(map(Literal.parse, case.must_change)),
         tuple(map(Literal.parse, case.must_stay)),
     )
-    replanner = PlannerReplanner(VALIDATOR, DOMAIN, config)
+    replanner = PlannerReplanner(VALIDATOR, DOMAIN, config or SearchConfig(time_limit_s=60.0))
     answer = replanner.replan(context(case.task, current, index, graph), diagnosis)
     if answer.outcome is ReplanOutcome.SOLVED:
         assert answer.plan is not None
@@ -406,3 +408,12 @@ def test_two_mugs_the_near_one_blocked_and_the_plan_names_the_one_it_was_checked
     assert [
         s.args[0] for s in answer.check.plan if s.skill == "pick_up" and "Mug" in s.args[0]
     ] == [s.args[0] for s in sent]
+
+
+def test_a_burner_is_off_during_a_long_detour_and_on_again_for_the_rest() -> None:
+    answer, _ = attempt(REPAIRS["dirty pan"])
+    assert answer.plan is not None
+    texts = answer.plan.texts()
+    assert texts.index("toggle_off(StoveBurner-1)") < texts.index("pick_up(Pan-1)")
+    assert texts.index("toggle_on(StoveBurner-1)") > texts.index("put_in(Pan-1, Sink-1)")
+    assert texts.index("toggle_on(StoveBurner-1)") < texts.index("crack_obj(Egg-1)")

@@ -22,7 +22,16 @@ from forestall.tasks.plan_errors import RATES
 from forestall.worlds.kitchen.part import Kitchens
 
 DOMAIN = shipped("household")
-DRAWN = ("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "long")
+DRAWN = (
+    "everyday",
+    "composed",
+    "midrun",
+    "double",
+    "planner",
+    "planner-harmless",
+    "long",
+    "hidden",
+)
 NAMES = [n for of in DRAWN for n in scenario_names(of)]
 SAMPLE = NAMES[::19]
 KITCHENS = Kitchens()
@@ -33,7 +42,8 @@ def test_the_sets_have_their_sizes_over_all_tasks() -> None:
     assert sizes["everyday"] >= 200
     assert sizes["composed"] >= 100 and sizes["planner"] >= 100
     assert sizes["midrun"] >= 60 and sizes["double"] >= 40 and sizes["long"] >= 30
-    for of in ("everyday", "composed", "midrun", "double", "planner"):
+    assert sizes["hidden"] == 50
+    for of in ("everyday", "composed", "midrun", "double", "planner", "hidden"):
         found = Counter(load_scenario(n).task for n in scenario_names(of))
         assert found.keys() == set(task_names())
     long = Counter(load_scenario(n).task for n in scenario_names("long"))

@@ -113,7 +113,7 @@ def _units(trace: Trace, steps: Sequence[Subtask], own: int) -> list[_Unit]:
                 landmark_of(state, subject) if subject else "",
                 frozenset(h for _, h in state.in_hands()),
                 bool(unsafe(trace.states[k + 1])),
-                _for_good(state, trace.states[k + 1]),
+                for_good(state, trace.states[k + 1]),
                 k < own,
             )
         )
@@ -199,7 +199,7 @@ def _faces(state: State, step: Subtask) -> bool:
     )
 
 
-def _for_good(before: State, after: State) -> bool:
+def for_good(before: State, after: State) -> bool:
     """Whether something has happened that no skill and no process takes back."""
     domain = before.domain
     if before.kinds != after.kinds:

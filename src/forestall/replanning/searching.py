@@ -15,16 +15,22 @@ from forestall.types.facts import category_of
 from forestall.types.plan import Subtask
 
 
-def to_shut(state: State, places: Iterable[str]) -> list[Fact]:
-    """What is to be as usual again about places that no safety rule lets stay as they are."""
-    wanted, domain = set(places), state.domain
+def as_usual(state: State, things: Iterable[str] | None = None) -> list[Fact]:
+    """What is to be as usual again about things that no safety rule lets stay as they are.
+
+    Args:
+        state: with what must never be so and is.
+        things: only these; None: whatever it is.
+    """
+    wanted, domain = None if things is None else set(things), state.domain
     found: dict[Fact, None] = {}
     for rule in domain.safety:
         for names in state.bindings(rule.variables, rule.never, {}):
             for literal, _ in literals(rule.never):
                 ground = literal.bind(names)
-                if ground.predicate in domain.attributes and ground.args[0] in wanted:
-                    usual = domain.default_states(state.kinds[ground.args[0]])
+                one = ground.args[0] if ground.args else ""
+                if ground.predicate in domain.attributes and (wanted is None or one in wanted):
+                    usual = domain.default_states(state.kinds[one])
                     found[Fact(ground.predicate, ground.args, usual[ground.predicate])] = None
     return list(found)
 

@@ -9,23 +9,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from forestall.deadline import Deadline, TimeUp
 from forestall.domain.looked import searched
 from forestall.domain.model import Domain
 from forestall.planning.goals import alternatives
-from forestall.planning.needless import pruned
 from forestall.planning.planner import Planned, plan_goal, plan_to
 from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
-from forestall.planning.thrift import thrifty
 from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
+from forestall.replanning.cheaper import Asked, cheaper
 from forestall.replanning.hidden import IN_VAIN, hiding_places, in_vain, sought
 from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
-from forestall.replanning.searching import to_shut, with_shutting, without
+from forestall.replanning.searching import as_usual, with_shutting, without
 from forestall.seams import PlanValidator
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, Subtask
@@ -166,13 +164,13 @@ class PlannerReplanner:
             places = hiding_places(
                 name, context.graph, self.domain, context.references, _stands_at(context)
             )
-            shutting = self._to(attempts, state, to_shut(state, empty)).subtasks if empty else ()
+            shutting = self._to(attempts, state, as_usual(state, empty)).subtasks if empty else ()
             for place in (p for p in places if p not in empty):
                 found = self._look_into(attempts, context, state, place, shutting)
                 if found is None or found.plan is None:
                     continue
                 after = run(state, found.plan.subtasks).final
-                again = to_shut(after, (place,))
+                again = as_usual(after, (place,))
                 closing = self._to(attempts, after, again).subtasks if again else ()
                 rest = without(context.remaining(), shutting, self.domain)
                 opening = found.plan.subtasks
@@ -301,29 +299,15 @@ class PlannerReplanner:
         rest: int,
         wanted: Sequence[Literal],
     ) -> Replan:
-        """The plan in less of the robot's time, without steps that nothing asks for.
-
-        What must change still does before the old plan, its last `rest` steps, is taken up again.
-        """
-        assert found.plan is not None
-        steps, best = found.plan.subtasks, found
-        shortest, mine = steps, len(steps) - rest
-        restored = _restored(state, steps, mine, wanted)
-
-        def accepts(shorter: tuple[Subtask, ...], own: int) -> bool:
-            nonlocal best, shortest, mine
-            if not restored <= _restored(state, shorter, own, wanted):
-                return False
-            accepted = self._checked(attempts, context, state, shorter)
-            if accepted is not None:
-                best, shortest, mine = accepted, shorter, own
-            return accepted is not None
-
-        with suppress(TimeUp):  # the plan as it is will do
-            pruned(state, steps, mine, accepts)
-            if thrifty(state, shortest, mine, accepts, _stands_at(context)) != steps:
-                pruned(state, shortest, mine, accepts)
-        return best
+        """The plan that takes the robot less, its last `rest` steps being the old plan's."""
+        asked = Asked(
+            state,
+            tuple(wanted),
+            lambda steps: self._checked(attempts, context, state, steps),
+            lambda start, facts: self._to(attempts, start, facts).subtasks,
+            _stands_at(context),
+        )
+        return cheaper(asked, found, rest)
 
     def _failed(self, attempts: _Attempts, state: State, wanted: list[Literal]) -> Replan:
         hands = self.domain.robot.hands
@@ -384,14 +368,6 @@ def _stands_at(context: BoundaryContext) -> tuple[float, float] | None:
     if context.observation is None:
         return None
     return context.observation.robot_position_world_m[:2]
-
-
-def _restored(
-    state: State, steps: Sequence[Subtask], count: int, wanted: Sequence[Literal]
-) -> set[Literal]:
-    """Which of some facts hold after the first steps of a plan."""
-    after = run(state, steps[:count]).final
-    return {x for x in wanted if after.holds(x)}
 
 
 def _is_lost(state: State, name: str) -> bool:
