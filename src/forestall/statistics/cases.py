@@ -42,8 +42,8 @@ LONG_UNDISTURBED = "long-undisturbed"
 CASE_SETS = ("robofail", "irreversible", UNDISTURBED, "harmless")
 
 FURTHER_SETS = (
-    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes", "hidden"),
-    *(LONG, LONG_UNDISTURBED),
+    *("everyday", "composed", "midrun", "double", "planner", "planner-harmless", "eyes"),
+    *(LONG, LONG_UNDISTURBED, "hidden"),
 )
 
 
