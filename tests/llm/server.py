@@ -1,4 +1,4 @@
-"""A server that speaks the protocol of OpenAI's chat completions, and answers what a script says."""
+"""A server that speaks the protocol of OpenAI's chat completions; a script says its answers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
@@ -111,10 +111,8 @@ def serving(script: Script) -> Iterator[Scripted]:
                 self.close_connection = True
 
         def handle(self) -> None:
-            try:
+            with suppress(OSError):  # whoever asked has gone away
                 super().handle()
-            except OSError:  # whoever asked has gone away
-                pass
 
         def log_message(self, format: str, *args: Any) -> None:
             pass

@@ -227,7 +227,7 @@ class OpenAIModel:
             "model": self._config.model, "messages": messages, "max_tokens": request.max_tokens,
         }  # fmt: skip
         if self._config.temperature is not None:
-            body["temperature"] = self._config.temperature
+            body |= dict(temperature=self._config.temperature)
         schema = json.loads(request.schema)
         if self._config.schema:
             name = request.purpose.replace(" ", "_")

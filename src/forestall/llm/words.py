@@ -20,7 +20,7 @@ from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.plan import Subtask
 
-_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}(-[0-9]{1,6})?")
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _LONGEST, _LONGEST_NAME = 400, 80
 
 
@@ -89,9 +89,7 @@ def places(graph: SceneGraph, domain: Domain, things: Collection[str], most: int
     lines = []
     for takes, found in groups.items():
         more = "" if len(found) <= most else ", ..."
-        verb = "takes" if len(found) == 1 else "take"
-        of = ", ".join(map(name, takes))
-        lines.append(f"{', '.join(found[:most])}{more} {verb} {of}")
+        lines.append(f"room for {', '.join(map(name, takes))}: {', '.join(found[:most])}{more}")
     return lines
 
 

@@ -135,10 +135,14 @@ class ModelReplanner:
         return self._domain.robot.skills or tuple(self._domain.skills)
 
     def _things(self, context: BoundaryContext) -> frozenset[str]:
-        """Names that a step may use: what is there, and what the plan at hand speaks of."""
-        hands = self._domain.robot.hands
-        here = {n.id for n in context.graph.nodes if n.id not in hands}
-        return frozenset(here | {a for s in context.remaining() for a in s.args})
+        """Names that a step may use: what is there, and what the plan at hand speaks of.
+
+        Of places of which any will do the category is a name, too.
+        """
+        domain = self._domain
+        here = [n for n in context.graph.nodes if n.id not in domain.robot.hands]
+        names = {n.id for n in here} | {a for s in context.remaining() for a in s.args}
+        return frozenset(names | {n.category for n in here if domain.is_open_support(n.category)})
 
     def _near(self, context: BoundaryContext, diagnosis: Diagnosis) -> frozenset[str]:
         """Things that are told with all that is known of them."""

@@ -219,7 +219,8 @@ class Diagnosis:
     kept. Without both `must_change` and `advice` nothing was found that must change. Where what is
     left of the plan was checked, `step` is its step that would be refused, None where all would
     run, and `refusal` says what is lacking; without a refusal `step` was tried. Where the evidence
-    is demonstrations, the fact that weighs most held in the first number of `support` of the second.
+    is demonstrations, the fact that weighs most held in the first number of `support` of the
+    second.
     """
 
     cause: str
