@@ -1,6 +1,7 @@
 """Prompts: every fragment has a purpose and renders, all are short, and data stays data."""
 
 import dataclasses
+from typing import Any
 
 import jinja2
 import pytest
@@ -16,7 +17,7 @@ from llm.scenes import EXPLAINED, REPAIR, VALIDATOR, Scripted, alarm, occupied, 
 from llm.test_replanning import VACANT
 from planning.corpus import DOMAIN
 
-VALUES = {
+VALUES: dict[str, dict[str, Any]] = {
     "correction": {"reason": "step 1"},
     "data": {},
     "facts": {"vocabulary": "on(A, B)"},

@@ -12,6 +12,7 @@ import json
 import os
 import threading
 import time
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass
 from email.utils import parsedate_to_datetime
@@ -129,8 +130,11 @@ class OpenAIModel:
                 "a language model needs the package openai: pip install 'forestall[llm]'"
             ) from error
         self._sdk: Any = openai
-        with openai.OpenAI(api_key="none") as client:  # what it loads late takes no question's time
-            _ = client.chat.completions.with_streaming_response.create
+        client = openai.OpenAI(
+            api_key=self._key or "none", base_url=self._config.base_url, max_retries=0
+        )
+        self._create: Any = client.chat.completions.with_streaming_response.create
+        weakref.finalize(self, client.close)
         self._calls = self._tokens = 0
         self._lock = threading.Lock()
 
@@ -189,22 +193,16 @@ class OpenAIModel:
     def _sent(self, request: Request, limit: Deadline) -> _Got:
         sdk = self._sdk
         try:
-            with sdk.OpenAI(
-                api_key=self._key or "none",
-                base_url=self._config.base_url,
-                timeout=max(limit.left(), 0.001),
-                max_retries=0,
-            ) as client:
-                asked = client.chat.completions.with_streaming_response.create
-                with asked(**self._body(request)) as response:
-                    body = bytearray()
-                    for piece in response.iter_bytes():
-                        body += piece
-                        if len(body) > MOST_BYTES:
-                            return _Got(problem=f"the answer is larger than {MOST_BYTES} bytes")
-                        if limit.over:
-                            return _Got(problem="the answer did not end in time", again=True)
-                    return _Got(bytes(body))
+            left_s = max(limit.left(), 0.001)
+            with self._create(**self._body(request), timeout=left_s) as response:
+                body = bytearray()
+                for piece in response.iter_bytes():
+                    body += piece
+                    if len(body) > MOST_BYTES:
+                        return _Got(problem=f"the answer is larger than {MOST_BYTES} bytes")
+                    if limit.over:
+                        return _Got(problem="the answer did not end in time", again=True)
+                return _Got(bytes(body))
         except sdk.APIStatusError as error:
             again = error.status_code in _AGAIN or error.status_code >= 500
             why = f"the endpoint answered {error.status_code}: {self._told(error)}"

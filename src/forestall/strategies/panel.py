@@ -98,8 +98,7 @@ def together(check: PlanCheck | None, compared: Diagnosis | None) -> Diagnosis:
     refused = None if check is None or check.ok else would_not_work(check)
     found = [d for d in (refused, compared) if d is not None]
     first = next((d for d in found if d.must_change), found[0])
-    shown = first is compared
-    if compared is not None:
+    if compared is not None and first is not compared:
         first = replace(
             first, why=compared.why, advice=compared.advice, exchanges=compared.exchanges
         )
@@ -112,5 +111,5 @@ def together(check: PlanCheck | None, compared: Diagnosis | None) -> Diagnosis:
         must_change=change,
         must_stay=tuple(x for x in compared.must_stay if x not in change),
         culprits=tuple(dict.fromkeys((*refused.culprits, *compared.culprits))),
-        support=compared.support if same or shown else None,
+        support=compared.support if same or first is compared else None,
     )
