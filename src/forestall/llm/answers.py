@@ -72,6 +72,23 @@ def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
     return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)), sort_keys=True)
 
 
+def explanation_schema() -> str:
+    """The schema of one sentence for people."""
+    return json.dumps(_object(explanation=_text("one sentence")), sort_keys=True)
+
+
+def sentence_of(answer: str) -> str:
+    """The sentence.
+
+    Raises:
+        Unfit: there is none.
+    """
+    text = _read(answer, lambda field: line(field["explanation"].text()))
+    if not text:
+        raise Unfit("the explanation is empty")
+    return text
+
+
 @dataclass(frozen=True, slots=True)
 class Explained:
     """What a model says of a scene that does not fit; `dropped` are facts that mean nothing."""
