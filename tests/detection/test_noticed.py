@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from baseline_samples import MeanColour, Said, frame, graph, node, observation, reference
+from baseline_samples import MeanColour, Said, graph, node, observation, reference
 
 from forestall.comparison.options import ScoreConfig
 from forestall.comparison.score import BatchScorer
@@ -32,7 +32,7 @@ def test_the_captions_detector_tells_two_captions() -> None:
 
 def test_the_image_detector_tells_the_nearest_picture_and_how_alike_it_is() -> None:
     encoder = MeanColour()
-    red, green = observation(frame((255, 0, 0))), observation(frame((0, 255, 0)))
+    red, green = observation((255, 0, 0)), observation((0, 255, 0))
     then = reference("a", view_of(red, graph("Mug-1"), encoder, None))
     detector = ImageDetector(encoder, STRICT)
     verdict = detector.judge(graph("Mug-1"), green, [then])
