@@ -12,6 +12,7 @@ from forestall.seams import (
     DemonstrationStore,
     Detector,
     ImageTextEncoder,
+    LanguageModel,
     Perceiver,
     PlanValidator,
     Reasoner,
@@ -37,6 +38,7 @@ CAPTIONER = Kind[Captioner]("captioner", Captioner)
 STORE = Kind[DemonstrationStore]("store", DemonstrationStore)
 RETRIEVER = Kind[Retriever]("retriever", Retriever)
 DETECTOR = Kind[Detector]("detector", Detector)
+LLM = Kind[LanguageModel]("llm", LanguageModel)
 REASONER = Kind[Reasoner]("reasoner", Reasoner)
 REPLANNER = Kind[Replanner]("replanner", Replanner)
 VALIDATOR = Kind[PlanValidator]("validator", PlanValidator)

@@ -246,6 +246,7 @@ class RunState:
             replans=self.replans,
             when=when,
             refused=tuple(self.refused()),
+            executed=tuple((e.subtask, e.outcome.status) for e in self.executed),
         )
 
     @contextmanager

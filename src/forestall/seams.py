@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from forestall.deadline import Deadline
 from forestall.domain.model import Domain
 from forestall.types.demonstration import Demonstration
 from forestall.types.encoder import StateReading
@@ -23,6 +24,7 @@ from forestall.types.episode import (
     ExecutedRecord,
     SkillOutcome,
 )
+from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.kind import Kind
@@ -358,13 +360,22 @@ class Detector(Protocol):
         """`observed` is the scoped graph of the boundary; it may be all that there is."""
 
 
+class LanguageModel(Protocol):
+    """Answers questions in words, in a form that is asked for."""
+
+    name: str
+
+    def ask(self, request: Request, deadline: Deadline | None = None) -> Exchange:
+        """What came of a question, in time: an answer, or a problem that says why there is none."""
+
+
 class Reasoner(Protocol):
     """Explains a mismatch and says what must change (paper, "reasoning module")."""
 
     name: str
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
-        """An empty `must_change` says that nothing was found that must change."""
+        """No `must_change` and no `advice`: nothing was found that must change."""
 
 
 class PlanValidator(Protocol):

@@ -44,6 +44,7 @@ class Table:
 _SEEING = "forestall.assembly.seeing"
 _JUDGING = "forestall.assembly.judging"
 _EMBEDDINGS = "forestall.embeddings"
+_LANGUAGE = "forestall.assembly.language"
 
 TABLES: Mapping[str, Table] = {
     table.kind.name: table
@@ -115,14 +116,27 @@ TABLES: Mapping[str, Table] = {
             },
         ),
         Table(
+            kinds.LLM,
+            "none",
+            {name: f"{_LANGUAGE}:{name}" for name in ("none", "openai", "replay")},
+        ),
+        Table(
             kinds.REASONER,
             "preconditions",
-            {"none": f"{_JUDGING}:no_reasoning", "preconditions": f"{_JUDGING}:preconditions"},
+            {
+                "model": f"{_LANGUAGE}:model_reasoner",
+                "none": f"{_JUDGING}:no_reasoning",
+                "preconditions": f"{_JUDGING}:preconditions",
+            },
         ),
         Table(
             kinds.REPLANNER,
             "planner",
-            {"anew": f"{_JUDGING}:anew", "planner": f"{_JUDGING}:planner"},
+            {
+                "anew": f"{_JUDGING}:anew",
+                "model": f"{_LANGUAGE}:model_replanner",
+                "planner": f"{_JUDGING}:planner",
+            },
         ),
         Table(
             kinds.VALIDATOR,

@@ -67,7 +67,7 @@ class SeeingFlags:
         named = {
             f.name: getattr(self, f.name)
             for f in fields(self)
-            if f.name not in ("config", "settings")
+            if f.name not in ("config", "settings", "llm")
         }
         flags = Given.said(self.settings or ()).over(Given.named(named))
         if self.config is None:
@@ -100,11 +100,21 @@ class RunFlags(ComparingFlags):
             watch lets every detector judge and never interrupts.
         detector: of a strategy that steps in: scene-graph, objects, caption or image.
         threshold: alarm when no demonstration reaches this score.
+        llm: the language model that explains and plans: an endpoint's address, a model's name,
+            replay:FILE (the answers of an earlier run), record:FILE (write them down).
     """
 
     strategy: str | None = None
     detector: str | None = None
     threshold: float | None = None
+    llm: str | None = None
+
+    def read(self) -> tuple[Given, dict[str, Any]]:
+        """See above; what other flags say of reasoner, replanner and model goes over `llm`."""
+        from forestall.assembly.language import said_llm
+
+        given, run = super().read()
+        return given.over(said_llm(self.llm)), run
 
 
 def spelt(arguments: Iterable[str]) -> Iterator[str]:

@@ -64,6 +64,16 @@ def judged(
     )
 
 
+def of_nearest(verdict: Verdict, subject: str, what: str) -> tuple[str, ...]:
+    """A line about the nearest reference and its score, none where nothing speaks against it."""
+    nearest = verdict.nearest
+    if nearest is None or verdict.score is None or verdict.decision is Decision.PROCEED:
+        return ()
+    where = f"demonstration {nearest.demonstration}, step {nearest.index + 1} of {nearest.task}"
+    asked = f"{verdict.threshold:.2f} is asked for"
+    return (f"{subject} is like the nearest {what} ({where}) to {verdict.score:.2f}; {asked}",)
+
+
 def check_same(what: str, mine: str, theirs: str, reference: Reference) -> None:
     """See that both sides were made by the same encoder or captioner.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from forestall.detection.baseline import check_same, judged
+from forestall.detection.baseline import check_same, judged, of_nearest
 from forestall.detection.scene_graph import DetectorConfig
 from forestall.embeddings.views import caption_rows
 from forestall.seams import Captioner, TextEncoder
@@ -35,6 +35,18 @@ class CaptionDetector:
         self._captioner = captioner
         self._encoder = encoder
         self._config = config or DetectorConfig()
+
+    def noticed(
+        self, verdict: Verdict, observed: SceneGraph, observation: Observation | None
+    ) -> tuple[str, ...]:
+        """What it sees of a mismatch: the two captions."""
+        if verdict.nearest is None or observation is None:
+            return ()
+        view = verdict.nearest.view
+        then = "" if view is None else view.caption
+        now = self._captioner.caption(observation, observed)
+        lines = of_nearest(verdict, "the caption", "caption")
+        return (f"now: {now}", f"then: {then}", *lines) if lines else ()
 
     def judge(
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]

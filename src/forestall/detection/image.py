@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from forestall.detection.baseline import check_same, judged
+from forestall.detection.baseline import check_same, judged, of_nearest
 from forestall.detection.scene_graph import DetectorConfig
 from forestall.embeddings.views import image_feature
 from forestall.errors import InputError
@@ -30,6 +30,12 @@ class ImageDetector:
     def __init__(self, encoder: ImageEncoder, config: DetectorConfig | None = None) -> None:
         self._encoder = encoder
         self._config = config or DetectorConfig()
+
+    def noticed(
+        self, verdict: Verdict, observed: SceneGraph, observation: Observation | None
+    ) -> tuple[str, ...]:
+        """What it sees of a mismatch: how alike the nearest picture is, and which one it is."""
+        return of_nearest(verdict, "the picture", "picture")
 
     def judge(
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]

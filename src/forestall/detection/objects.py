@@ -14,7 +14,7 @@ from forestall.domain.model import Domain
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
-from forestall.types.verdict import Reference, Verdict, demonstrations_of, scenes
+from forestall.types.verdict import Decision, Reference, Verdict, demonstrations_of, scenes
 
 
 class ObjectCountDetector:
@@ -36,6 +36,16 @@ class ObjectCountDetector:
     def __init__(self, domain: Domain, config: DetectorConfig | None = None) -> None:
         self._supports = domain.tagged(domain.roles.support)
         self._config = config or DetectorConfig()
+
+    def noticed(
+        self, verdict: Verdict, observed: SceneGraph, observation: Observation | None
+    ) -> tuple[str, ...]:
+        """What it sees of a mismatch: the two lists of counts."""
+        if verdict.nearest is None or verdict.decision is Decision.PROCEED:
+            return ()
+        both = (counts(g, self._supports) for g in (observed, verdict.nearest.graph))
+        now, then = (", ".join(f"{n} {c}" for c, n in sorted(b.items())) for b in both)
+        return (f"now: {now or 'nothing'}", f"then: {then or 'nothing'}")
 
     def judge(
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]

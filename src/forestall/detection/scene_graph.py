@@ -78,6 +78,14 @@ class SceneGraphDetector:
         self._config = config or DetectorConfig()
         self._thresholds = thresholds
 
+    def noticed(
+        self, verdict: Verdict, observed: SceneGraph, observation: Observation | None
+    ) -> tuple[str, ...]:
+        """What it sees of a mismatch: each difference from the nearest demonstration."""
+        if verdict.decision is Decision.PROCEED:
+            return ()
+        return tuple(d.text for d in verdict.discrepancies)
+
     def judge(
         self, observed: SceneGraph, observation: Observation | None, references: Sequence[Reference]
     ) -> Verdict:

@@ -133,7 +133,7 @@ def cause_of(boundary: BoundaryRecord) -> str:
     if diagnosis is None:
         note = "" if boundary.verdict is None else boundary.verdict.note
         return f"no diagnosis was made: {note}" if note else "no diagnosis was made"
-    if diagnosis.must_change or "nothing was found" in diagnosis.cause.lower():
+    if diagnosis.found or "nothing was found" in diagnosis.cause.lower():
         return diagnosis.cause
     return f"{NOTHING_FOUND}: {diagnosis.cause}" if diagnosis.cause else NOTHING_FOUND
 
@@ -142,7 +142,7 @@ def outcome_of(boundary: BoundaryRecord) -> ReplanOutcome | None:
     """How the replanning after an alarm ended, None where none was tried."""
     if boundary.replan is not None:
         return boundary.replan.outcome
-    if boundary.diagnosis is not None and not boundary.diagnosis.must_change:
+    if boundary.diagnosis is not None and not boundary.diagnosis.found:
         return ReplanOutcome.NOTHING_TO_CHANGE
     return None
 
@@ -260,7 +260,7 @@ def _mark(
     if verdict.decision is Decision.REPLAN:
         assert boundary is not None
         diagnosis = boundary.diagnosis
-        found = diagnosis is not None and bool(diagnosis.must_change)
+        found = diagnosis is not None and diagnosis.found
         dismissed = not found or outcome_of(boundary) is ReplanOutcome.NOTHING_TO_CHANGE
         return Mark.DISMISSED if dismissed else Mark.UNSOLVED
     if verdict.decision is Decision.LOOK_AGAIN:

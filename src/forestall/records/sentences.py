@@ -75,6 +75,8 @@ def _what_is(
         return _refused(context, diagnosis, bound, domain, spoken)
     if diagnosis.step is not None:
         return spoken.text(diagnosis.cause)
+    if not bound and diagnosis.advice:
+        return spoken.text(diagnosis.cause)
     if not bound:
         return _unexplained(decision.verdict, diagnosis, spoken)
     if all(x.predicate == LOCATED for x in bound):

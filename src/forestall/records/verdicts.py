@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 from forestall.reading.fields import Field
+from forestall.records.exchanges import exchanges_from, exchanges_json
 from forestall.types.demonstration import View
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
@@ -208,6 +209,9 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "step": None if diagnosis.step is None else str(diagnosis.step),
         "refusal": diagnosis.refusal,
         "support": diagnosis.support,
+        **({"why": diagnosis.why} if diagnosis.why else {}),
+        **({"advice": diagnosis.advice} if diagnosis.advice else {}),
+        **exchanges_json(diagnosis.exchanges),
     }
 
 
@@ -222,6 +226,9 @@ def diagnosis_from(field: Field) -> Diagnosis:
         step=field.optional("step", subtask),
         refusal=field.optional("refusal", Field.text) or "",
         support=field.optional("support", _support),
+        why=field.optional("why", Field.text) or "",
+        advice=field.optional("advice", Field.text) or "",
+        exchanges=exchanges_from(field),
     )
 
 
@@ -244,6 +251,7 @@ def replan_json(replan: Replan) -> dict[str, Any]:
         "seconds": replan.seconds,
         "note": replan.note,
         "looking_for": list(replan.looking_for),
+        **exchanges_json(replan.exchanges),
     }
 
 
@@ -258,6 +266,7 @@ def replan_from(field: Field) -> Replan:
         seconds=field["seconds"].number(),
         note=field["note"].text(),
         looking_for=field.optional("looking_for", lambda f: f.tuple_of(Field.text)) or (),
+        exchanges=exchanges_from(field),
     )
 
 

@@ -16,7 +16,7 @@ from forestall.domain.truth import truth
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.types.facts import Literal, Truth
-from forestall.types.plan import Plan, same_step
+from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import (
     Calibration,
@@ -69,7 +69,7 @@ class Intervention:
         self._validator = AskedValidator(validator)
         self._max_attempts = max_attempts
         self._resume_left = 0
-        self._attempts: dict[tuple[Literal, ...], int] = {}
+        self._attempts: dict[tuple[Literal, ...] | Subtask, int] = {}
         self._sought: frozenset[str] = frozenset()
         self._looked: frozenset[str] = frozenset()
 
@@ -196,11 +196,11 @@ class Intervention:
         clock: Clock,
     ) -> StrategyAnswer:
         """Replan for what must change; `context.index` is where the plan at hand would go on."""
-        if not diagnosis.must_change:
+        if not diagnosis.found:
             replan = Replan(ReplanOutcome.NOTHING_TO_CHANGE, producer=self._replanner.name)
             why = f"no cause was found: {diagnosis.cause}"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, replan, why, clock.items())
-        key = tuple(sorted(diagnosis.must_change))
+        key = tuple(sorted(diagnosis.must_change)) or context.subtask  # words have no key
         if self._attempts.get(key, 0) >= self._max_attempts:
             why = f"tried {self._max_attempts} repairs of this already"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())

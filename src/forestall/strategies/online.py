@@ -141,7 +141,9 @@ class Online:
         if self._inherited or self._before is None or not diagnosis.must_change:
             return diagnosis
         before = replace(self._before, references=references)
-        known = set(self._reasoner.diagnose(before, verdict).must_change)
+        earlier = self._reasoner.diagnose(before, verdict)
+        exchanges = (*diagnosis.exchanges, *earlier.exchanges)
+        diagnosis, known = replace(diagnosis, exchanges=exchanges), set(earlier.must_change)
         own = tuple(
             x
             for x in diagnosis.must_change

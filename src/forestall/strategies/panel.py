@@ -98,6 +98,10 @@ def together(check: PlanCheck | None, compared: Diagnosis | None) -> Diagnosis:
     refused = None if check is None or check.ok else would_not_work(check)
     found = [d for d in (refused, compared) if d is not None]
     first = next((d for d in found if d.must_change), found[0])
+    if compared is not None and first is not compared:
+        first = replace(
+            first, why=compared.why, advice=compared.advice, exchanges=compared.exchanges
+        )
     if refused is None or compared is None or not compared.must_change:
         return first
     change = tuple(dict.fromkeys((*refused.must_change, *compared.must_change)))

@@ -13,6 +13,7 @@ from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retrie
 from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock, Intervention, look_again
 from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.exchange import Exchange
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.verdict import Decision, Diagnosis, Verdict, scenes
 
@@ -113,13 +114,22 @@ class PostHoc:
 
         What was needed at the located step is not needed at the end: the goal is.
         """
+        asked: tuple[Exchange, ...] = ()
         for context, verdict in self._summary.unlike:
             found = self._reasoner.diagnose(context, verdict)
-            if found.must_change:
+            asked = (*asked, *found.exchanges)
+            if found.found:
                 where = f"located at step {context.index + 1}, {context.subtask}: {found.cause}"
                 return replace(
-                    missed, cause=where, culprits=found.culprits, producer=self._reasoner.name
+                    missed,
+                    cause=where,
+                    culprits=found.culprits,
+                    producer=self._reasoner.name,
+                    why=found.why,
+                    advice=found.advice,
+                    exchanges=asked,
                 )
+        missed = replace(missed, exchanges=asked)
         if self._summary.failed:
             context, status = self._summary.failed[0]
             where = f"located at step {context.index + 1}, {context.subtask}: it was {status.value}"

@@ -171,7 +171,7 @@ class Proactive:
         compared = None
         if against:
             first = replace(against[0], decision=Decision.REPLAN)
-            compared = self._reasoner.diagnose(context, first)
+            compared = self._reasoner.diagnose(replace(context, said=tuple(said)), first)
         clock.lap("diagnose")
         if unseen and (compared is None or not compared.must_change):
             found = self._intervention.look_for(context, verdict, clock)

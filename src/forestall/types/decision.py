@@ -80,7 +80,7 @@ class MonitorDecision:
     def __str__(self) -> str:
         """The answer in words: outcome, subtask, why; what to do instead on lines of their own."""
         about = "" if self.subtask is None else f" before {self.subtask}"
-        known = self.diagnosis is not None and self.diagnosis.must_change
+        known = self.diagnosis is not None and self.diagnosis.found
         cause = self.diagnosis.cause if self.diagnosis is not None and known else ""
         why = cause if self.outcome is Outcome.REPLAN else (self.why or cause)
         if self.outcome is Outcome.HOLD and self.hold is not None and not why:

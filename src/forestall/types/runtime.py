@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Task
 from forestall.types.verdict import Decision, Diagnosis, Reference, Replan, Verdict
+
+if TYPE_CHECKING:
+    from forestall.types.episode import SkillStatus
 
 
 class LooksAfter(Enum):
@@ -50,6 +54,8 @@ class BoundaryContext:
             plan it is the plan's length and `subtask` the last one.
         refused: ground subtasks that the robot refused, about whose arguments nothing has changed
             since; a plan that has one of them will be refused again.
+        executed: what was tried so far, and how each subtask ended.
+        said: what every judge said of this scene, where several are heard.
     """
 
     task: Task
@@ -66,6 +72,8 @@ class BoundaryContext:
     replans: int = 0
     when: When = When.BEFORE
     refused: tuple[Subtask, ...] = ()
+    executed: tuple[tuple[Subtask, SkillStatus], ...] = ()
+    said: tuple[Verdict, ...] = ()
 
     def remaining(self) -> tuple[Subtask, ...]:
         """What is left of the plan, this subtask first (not grounded)."""

@@ -10,6 +10,7 @@ from numbers import Real
 
 from forestall.errors import InputError
 from forestall.types.demonstration import View
+from forestall.types.exchange import Exchange
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
@@ -215,10 +216,11 @@ class Diagnosis:
     """Why the scene does not fit, and what must change.
 
     `must_change` are ground literals that should hold and do not; `must_stay` hold and should be
-    kept. An empty `must_change` means: nothing was found that must change. Where what is left of
-    the plan was checked, `step` is its step that would be refused, None where all would run, and
-    `refusal` says what is lacking; without a refusal `step` was tried. Where the evidence is
-    demonstrations, the fact that weighs most held in the first number of `support` of the second.
+    kept. Without both `must_change` and `advice` nothing was found that must change. Where what is
+    left of the plan was checked, `step` is its step that would be refused, None where all would
+    run, and `refusal` says what is lacking; without a refusal `step` was tried. Where the evidence
+    is demonstrations, the fact that weighs most held in the first number of `support` of the
+    second.
     """
 
     cause: str
@@ -229,6 +231,14 @@ class Diagnosis:
     step: Subtask | None = None
     refusal: str = ""
     support: tuple[int, int] | None = None
+    why: str = ""  # how the cause leads to a failure, where somebody says so
+    advice: str = ""  # what to do about it, in words
+    exchanges: tuple[Exchange, ...] = ()  # with a language model, in their order
+
+    @property
+    def found(self) -> bool:
+        """Whether something was found that must change, be it in words alone."""
+        return bool(self.must_change or self.advice)
 
 
 class ReplanOutcome(Enum):
@@ -272,3 +282,4 @@ class Replan:
     seconds: float = 0.0
     note: str = ""
     looking_for: tuple[str, ...] = ()  # the plan opens a place in which these may be
+    exchanges: tuple[Exchange, ...] = ()  # with a language model, in their order

@@ -1,0 +1,132 @@
+"""Factories of what a language model does, and what `--llm` says.
+
+Named in `registry`, called through `parts`; calls llm, diagnosis, replanning. Reasoner and
+replanner of a model have the plain ones behind them, which answer where the model does not.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from forestall.assembly.configuration import Given
+from forestall.assembly.registry import known
+from forestall.diagnosis.model import ModelReasoner
+from forestall.errors import InputError
+from forestall.kinds import LLM, REASONER, REPLANNER, VALIDATOR
+from forestall.llm.client import ClientConfig, OpenAIModel
+from forestall.llm.recording import RecordingModel, ReplayingModel
+from forestall.replanning.model import ModelReplanner
+from forestall.seams import LanguageModel, Parts
+
+_NO_MODEL = "none"
+
+
+def none() -> LanguageModel:
+    """No model; whoever asks for one is told how to name it.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError(
+        "no language model is named: say --llm http://host:port/v1, --llm MODEL or "
+        "--llm replay:FILE"
+    )
+
+
+def openai(*, endpoint: ClientConfig | None = None, record: Path | None = None) -> LanguageModel:
+    """An OpenAI-compatible endpoint.
+
+    Args:
+        endpoint: which, and how it is asked.
+        record: a file that all answers are written to, for the part replay.
+    """
+    model = OpenAIModel(endpoint)
+    return model if record is None else RecordingModel(model, record)
+
+
+def replay(*, file: Path) -> ReplayingModel:
+    """The answers of an earlier run.
+
+    Args:
+        file: that `record` wrote.
+    """
+    return ReplayingModel(file)
+
+
+def model_reasoner(
+    parts: Parts,
+    *,
+    attempts: int = 2,
+    pictures: bool = False,
+    otherwise: str = "preconditions",
+) -> ModelReasoner:
+    """A language model explains.
+
+    Args:
+        parts: llm, domain.
+        attempts: answers that are asked for.
+        pictures: whether the robot's picture goes with the question.
+        otherwise: the reasoner that explains where the model does not; "none": nobody does.
+    """
+    _at_least_one(attempts)
+    behind = None if otherwise == _NO_MODEL else parts.part(REASONER, otherwise)
+    model = parts.part(LLM)
+    return ModelReasoner(model, parts.domain, behind, attempts=attempts, pictures=pictures)
+
+
+def model_replanner(
+    parts: Parts,
+    *,
+    validator: str | None = None,
+    attempts: int = 3,
+    otherwise: str = "planner",
+) -> ModelReplanner:
+    """A language model plans.
+
+    Args:
+        parts: llm, validator, domain.
+        validator: of what it answers; the run's own by default.
+        attempts: answers that are asked for.
+        otherwise: the replanner that plans where no answer is accepted; "none": nobody does.
+    """
+    _at_least_one(attempts)
+    behind = None if otherwise == _NO_MODEL else parts.part(REPLANNER, otherwise)
+    checks = parts.part(VALIDATOR) if validator is None else parts.part(VALIDATOR, validator)
+    return ModelReplanner(parts.part(LLM), checks, parts.domain, behind, attempts=attempts)
+
+
+def _at_least_one(attempts: int) -> None:
+    if attempts < 1:
+        raise InputError(f"attempts is {attempts}: at least 1 is needed")
+
+
+def said_llm(text: str | None) -> Given:
+    """What `--llm` says: the model, and that it explains and plans.
+
+    Args:
+        text: an address of an endpoint, "replay:FILE", "record:FILE", a part's name, or the name
+            of a model at OpenAI.
+
+    Raises:
+        InputError: no file after the colon.
+    """
+    if text is None:
+        return Given()
+    if text == _NO_MODEL:
+        return Given.named({LLM.name: _NO_MODEL})
+    return Given.named({LLM.name: _model(text), REASONER.name: "model", REPLANNER.name: "model"})
+
+
+def _model(text: str) -> dict[str, str]:
+    how, colon, rest = text.partition(":")
+    if colon and how in ("replay", "record"):
+        if not rest:
+            raise InputError(f"--llm {text}: name the file, as in --llm {how}:answers.jsonl")
+        return {"name": "replay", "file": rest} if how == "replay" else {
+            "name": "openai", "record": rest,
+        }  # fmt: skip
+    if how in ("http", "https"):
+        return {"name": "openai", "base_url": text}
+    if text in known(LLM.name) or (colon and rest.isidentifier() and "." in how):
+        return {"name": text}
+    return {"name": "openai", "model": text}

@@ -1,0 +1,1 @@
+"""Language models: an endpoint asked, its answers recorded and replayed, prompts and parsing."""

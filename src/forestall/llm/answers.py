@@ -1,0 +1,246 @@
+"""Schemas of answers, and answers read into types: whatever does not fit is a reason in words.
+
+Called by whoever asks a language model. An answer is checked against the domain and the scene, and
+nothing of it is ever called by its name.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from forestall.domain.checks import check_literal
+from forestall.domain.model import Domain
+from forestall.domain.truth import truth
+from forestall.errors import ForestallError
+from forestall.llm.words import changeable
+from forestall.reading.documents import parse_json
+from forestall.reading.fields import Field
+from forestall.types.facts import Literal, Truth
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Subtask
+
+T = TypeVar("T")
+
+MOST_FACTS, MOST_STEPS = 12, 60
+_LONGEST = 400
+_FENCE = re.compile(r"^\s*```(?:json)?\s*\n(.*?)\n?\s*```\s*$", re.DOTALL)
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def _list(items: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items}
+
+
+def _text(description: str) -> dict[str, Any]:
+    return {"type": "string", "description": description}
+
+
+def diagnosis_schema(things: Collection[str]) -> str:
+    """The schema of an explanation; what it is because of is one of the things at hand."""
+    among = {"type": "string", "enum": sorted(things)} if things else {"type": "string"}
+    return json.dumps(
+        _object(
+            cause=_text("what is wrong, one sentence"),
+            why=_text("how that makes the step fail, one sentence"),
+            because_of=_list(among),
+            must_change=_list(_text("a fact that must become true")),
+            must_stay=_list(_text("a fact that must stay true")),
+            advice=_text("what to do, one sentence"),
+        ),
+        sort_keys=True,
+    )
+
+
+def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
+    """The schema of a plan: its skills and things are the ones at hand."""
+    step = _object(
+        skill={"type": "string", "enum": sorted(skills)},
+        args=_list({"type": "string", "enum": sorted(things)}),
+    )
+    return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)), sort_keys=True)
+
+
+def explanation_schema() -> str:
+    """The schema of one sentence for people."""
+    return json.dumps(_object(explanation=_text("one sentence")), sort_keys=True)
+
+
+def sentence_of(answer: str) -> str:
+    """The sentence.
+
+    Raises:
+        Unfit: there is none.
+    """
+    text = _read(answer, lambda field: line(field["explanation"].text()))
+    if not text:
+        raise Unfit("the explanation is empty")
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """What a model says of a scene that does not fit; `dropped` are facts that mean nothing."""
+
+    cause: str
+    why: str
+    because_of: tuple[str, ...]
+    must_change: tuple[Literal, ...]
+    must_stay: tuple[Literal, ...]
+    advice: str
+    dropped: tuple[str, ...]
+
+
+class Unfit(ForestallError):
+    """An answer that cannot be taken; the text is what the model is told."""
+
+
+def _read(answer: str, read: Callable[[Field], T]) -> T:
+    """What a text in JSON says.
+
+    Raises:
+        Unfit: it is no JSON, or not what was asked for; says what and where.
+    """
+    fenced = _FENCE.match(answer)
+    try:
+        return read(Field(parse_json(answer if fenced is None else fenced[1])))
+    except Unfit:
+        raise
+    except ForestallError as error:
+        raise Unfit(f"the answer cannot be read: {error}") from error
+
+
+def explanation(answer: str, graph: SceneGraph, domain: Domain) -> Explained:
+    """Read an explanation; facts that the domain or the scene does not know are dropped.
+
+    Raises:
+        Unfit: it is none, or says nothing.
+    """
+    return _read(answer, lambda field: _explained(field, graph, domain))
+
+
+def _explained(field: Field, graph: SceneGraph, domain: Domain) -> Explained:
+    cause, why, advice = (line(field[k].text()) for k in ("cause", "why", "advice"))
+    if not cause and not advice:
+        raise Unfit("neither a cause nor an advice is given")
+    dropped: list[str] = []
+    change, stay = (
+        _facts(field[k], graph, domain, wanted, dropped)
+        for k, wanted in (("must_change", Truth.FALSE), ("must_stay", Truth.TRUE))
+    )
+    because = field["because_of"].at_most(MOST_FACTS, Field.text)
+    known = tuple(dict.fromkeys(n for n in because if graph.get(n) is not None))
+    stay = tuple(x for x in stay if x not in change)
+    return Explained(cause, why, known, change, stay, advice, tuple(dropped))
+
+
+def _facts(
+    field: Field, graph: SceneGraph, domain: Domain, wanted: Truth, dropped: list[str]
+) -> tuple[Literal, ...]:
+    found: dict[Literal, None] = {}
+    for text in field.at_most(MOST_FACTS, Field.text):
+        try:
+            found[known_fact(text, graph, domain, wanted)] = None
+        except ForestallError as error:
+            dropped.append(line(f"{text!r}: {error}"))
+    return tuple(found)
+
+
+def known_fact(text: str, graph: SceneGraph, domain: Domain, wanted: Truth) -> Literal:
+    """A fact about things of a scene that a plan can bring about, or keep.
+
+    Raises:
+        Unfit: it means nothing here, holds already, or does not hold.
+    """
+    parsed = Literal.parse(text)
+    args = []
+    for given in parsed.args:
+        meant = domain.canonical(given)
+        if meant in domain.robot.hands:
+            args.append(meant)
+            continue
+        matches = graph.matches(meant)
+        if not matches:
+            raise Unfit(f"there is no {meant} here")
+        args.append(matches[0] if len(matches) == 1 else meant)
+    fact = Literal(parsed.predicate, tuple(args), parsed.value)
+    check_literal(domain, "the answer", fact)
+    if fact.predicate not in changeable(domain):
+        raise Unfit(f"no plan brings about {fact.predicate}")
+    now = truth(graph, fact, domain)
+    if wanted is Truth.FALSE and now is Truth.TRUE:
+        raise Unfit("it holds already")
+    if wanted is Truth.TRUE and now is not Truth.TRUE:
+        raise Unfit("it is not seen to hold")
+    return fact
+
+
+def steps(
+    answer: str, skills: Collection[str], things: Collection[str], domain: Domain
+) -> tuple[Subtask, ...]:
+    """Read a plan's steps.
+
+    Raises:
+        Unfit: the first step that names a skill or a thing that is not at hand, by its number.
+    """
+
+    def read(field: Field) -> tuple[Subtask, ...]:
+        found = field["steps"].at_most(MOST_STEPS, _step)
+        for number, step in enumerate(found, 1):
+            _check(number, step, skills, things, domain)
+        return found
+
+    return _read(answer, read)
+
+
+def _step(field: Field) -> Subtask:
+    return Subtask(field["skill"].text(), field["args"].at_most(MOST_FACTS, Field.text))
+
+
+def _check(
+    number: int,
+    step: Subtask,
+    skills: Collection[str],
+    things: Collection[str],
+    domain: Domain,
+) -> None:
+    if step.skill not in skills:
+        raise Unfit(f"step {number}: there is no skill {_short(step.skill)}: {_some(skills)}")
+    for name in step.args:
+        if name not in things:
+            raise Unfit(f"step {number}, {step.skill}: there is no thing {_short(name)}")
+    try:
+        domain.check(step)
+    except ForestallError as error:
+        raise Unfit(f"step {number}: {error}") from error
+
+
+def _short(text: str) -> str:
+    return repr(line(text)[:60])
+
+
+def _some(names: Collection[str]) -> str:
+    return "the skills are " + ", ".join(sorted(names))
+
+
+def line(text: str, most: int = _LONGEST) -> str:
+    """A model's text on one line that can be shown, cut where it is long."""
+    shown = "".join(c if c.isprintable() else " " for c in text)
+    told = " ".join(shown.split())
+    return told if len(told) <= most else f"{told[: most - 1]}…"
+
+
+def because(reasons: Sequence[str]) -> str:
+    """What of an answer was left out, in one sentence; "" where nothing was."""
+    return f"left out: {'; '.join(reasons)}" if reasons else ""

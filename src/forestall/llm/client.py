@@ -1,0 +1,333 @@
+"""Any OpenAI-compatible endpoint, through the package openai (extra [llm]).
+
+Built by `assembly`, asked by reasoner and replanner. Whatever the endpoint does, `ask` comes back
+within its time and says what happened; it never raises for what is outside. The key comes from the
+environment, and no message of ours repeats it.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import threading
+import time
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass
+from email.utils import parsedate_to_datetime
+from typing import Any
+from urllib.parse import urlsplit
+
+from forestall.deadline import Deadline
+from forestall.errors import ForestallError, InputError
+from forestall.reading.documents import parse_json
+from forestall.reading.fields import Field
+from forestall.types.exchange import Exchange, Request
+
+MOST_BYTES = 256 * 1024
+"""How large the body of an answer may be; ours are a few kilobytes."""
+
+_AGAIN = (408, 409, 429)
+_FIRST_WAIT_S, _MOST_WAIT_S, _POLL_S = 0.5, 8.0, 0.05
+_LONGEST = 300
+"""Characters of somebody else's message."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClientConfig:
+    """How an endpoint is asked.
+
+    Args:
+        model: its name there.
+        base_url: of the endpoint, up to and with "/v1"; OpenAI's own by default.
+        key_variable: the environment variable that holds the key.
+        timeout_s: of one question, every further try and every pause between them included.
+        retries: further tries after an answer that says "later", or none at all.
+        temperature: of the model; None where the endpoint takes none.
+        schema: whether the endpoint is given the answer's JSON schema; else it stands in the text.
+        max_calls: tries of one run.
+        max_tokens: of one run, as the endpoint counts them, prompts and answers.
+        dollars_in: price of a million tokens of prompt; None: not known.
+        dollars_out: the same of answers.
+
+    Raises:
+        InputError: a number that cannot be, or an address that is none or holds a secret.
+    """
+
+    model: str = "gpt-4o"
+    base_url: str | None = None
+    key_variable: str = "OPENAI_API_KEY"
+    timeout_s: float = 20.0
+    retries: int = 3
+    temperature: float | None = 0.0
+    schema: bool = True
+    max_calls: int = 60
+    max_tokens: int = 200_000
+    dollars_in: float | None = None
+    dollars_out: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("timeout_s", "max_calls", "max_tokens"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} is {getattr(self, name)}: it must be above 0")
+        if self.retries < 0:
+            raise InputError(f"retries is {self.retries}: it must be at least 0")
+        if self.base_url is not None:
+            _check_address(self.base_url)
+
+
+def _check_address(text: str) -> None:
+    try:
+        parts = urlsplit(text)
+        valid = parts.scheme in ("http", "https") and bool(parts.hostname)
+        _ = parts.port
+    except ValueError:
+        valid = False
+    if not valid:
+        raise InputError(f"base_url {text!r} is no address: write http://host:port/v1")
+    if parts.username or parts.password or parts.query or parts.fragment:
+        raise InputError(
+            "base_url must hold no user, password or query, since it goes into the record: the key "
+            "belongs into an environment variable (key_variable)"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Got:
+    """What one try came to: a body, or a problem and whether another try may help."""
+
+    body: bytes = b""
+    problem: str = ""
+    again: bool = False
+    wait_s: float | None = None
+
+
+class OpenAIModel:
+    """Implements `LanguageModel`.
+
+    Args:
+        config: which endpoint, and how it is asked.
+
+    Raises:
+        InputError: the package is not installed, or there is no key for OpenAI's own endpoint.
+    """
+
+    def __init__(self, config: ClientConfig | None = None) -> None:
+        self._config = config or ClientConfig()
+        self.name = self._config.model
+        self._key = os.environ.get(self._config.key_variable, "")
+        if not self._key and self._config.base_url is None:
+            raise InputError(
+                f"the environment variable {self._config.key_variable} is not set: it holds the "
+                "key of the language model; one that runs here is named by its address, as in "
+                "--llm http://localhost:8000/v1"
+            )
+        try:
+            import openai
+        except ImportError as error:
+            raise InputError(
+                "a language model needs the package openai: pip install 'forestall[llm]'"
+            ) from error
+        self._sdk: Any = openai
+        client = openai.OpenAI(
+            api_key=self._key or "none", base_url=self._config.base_url, max_retries=0
+        )
+        self._create: Any = client.chat.completions.with_streaming_response.create
+        weakref.finalize(self, client.close)
+        self._calls = self._tokens = 0
+        self._lock = threading.Lock()
+
+    def ask(self, request: Request, deadline: Deadline | None = None) -> Exchange:
+        """See the Protocol."""
+        started_s = time.perf_counter()
+        limit = (deadline or Deadline()).within(self._config.timeout_s)
+        tries, got = 0, _Got(problem="nothing was asked")
+        pause_s = _FIRST_WAIT_S
+        while tries <= self._config.retries:
+            if problem := self._spent():
+                got = _Got(problem=problem)
+                break
+            if limit.over:
+                got = _Got(problem=got.problem if tries else "there was no time left to ask")
+                break
+            tries += 1
+            got = self._once(request, limit)
+            if not got.again or tries > self._config.retries:
+                break
+            wait_s = pause_s if got.wait_s is None else got.wait_s
+            if wait_s >= limit.left():
+                waiting = f"; it asks to wait {wait_s:g} s" if got.wait_s is not None else ""
+                got = _Got(problem=f"{got.problem}{waiting}, and the time is over before")
+                break
+            _sleep(wait_s, limit)
+            pause_s = min(2 * pause_s, _MOST_WAIT_S)
+        seconds = time.perf_counter() - started_s
+        return self._exchange(request, got, tries, seconds)
+
+    def _spent(self) -> str:
+        """Why nothing more is asked in this run, "" while there is something left."""
+        c = self._config
+        with self._lock:
+            if self._calls >= c.max_calls:
+                return f"the budget of this run is used up: {self._calls} calls of {c.max_calls}"
+            if self._tokens >= c.max_tokens:
+                return f"the budget of this run is used up: {self._tokens} tokens of {c.max_tokens}"
+            self._calls += 1
+        return ""
+
+    def _once(self, request: Request, limit: Deadline) -> _Got:
+        """One try, on a thread of its own: neither a name server nor a trickle takes longer."""
+        box: list[_Got] = []
+        thread = threading.Thread(
+            target=lambda: box.append(self._sent(request, limit)), name="language model",
+            daemon=True,
+        )  # fmt: skip
+        thread.start()
+        while thread.is_alive() and not limit.over:
+            thread.join(min(_POLL_S, max(limit.left(), 0.001)))
+        if box:
+            return box[0]
+        return _Got(problem=f"no answer within {self._config.timeout_s:g} s", again=True)
+
+    def _sent(self, request: Request, limit: Deadline) -> _Got:
+        sdk = self._sdk
+        try:
+            left_s = max(limit.left(), 0.001)
+            with self._create(**self._body(request), timeout=left_s) as response:
+                body = bytearray()
+                for piece in response.iter_bytes():
+                    body += piece
+                    if len(body) > MOST_BYTES:
+                        return _Got(problem=f"the answer is larger than {MOST_BYTES} bytes")
+                    if limit.over:
+                        return _Got(problem="the answer did not end in time", again=True)
+                return _Got(bytes(body))
+        except sdk.APIStatusError as error:
+            again = error.status_code in _AGAIN or error.status_code >= 500
+            why = f"the endpoint answered {error.status_code}: {self._told(error)}"
+            return _Got(problem=why, again=again, wait_s=_asked_to_wait(error.response.headers))
+        except sdk.APIConnectionError as error:
+            cause = error.__cause__ or error
+            return _Got(problem=f"the endpoint cannot be reached: {self._told(cause)}", again=True)
+        except Exception as error:  # noqa: BLE001 - a library of somebody else's, on a thread
+            return _Got(problem=f"the call failed: {self._told(error)}", again=True)
+
+    def _body(self, request: Request) -> dict[str, Any]:
+        messages: list[dict[str, Any]] = [{"role": r, "content": t} for r, t in request.messages]
+        first = next((m for m in messages if m["role"] == "user"), None)
+        if request.images and first is not None:
+            first["content"] = [{"type": "text", "text": first["content"]}]
+            for image in request.images:
+                shown = {"type": "image_url", "image_url": {"url": _data_url(image)}}
+                first["content"].append(shown)
+        body: dict[str, Any] = {
+            "model": self._config.model, "messages": messages, "max_tokens": request.max_tokens,
+        }  # fmt: skip
+        if self._config.temperature is not None:
+            body |= dict(temperature=self._config.temperature)
+        schema = json.loads(request.schema)
+        if self._config.schema:
+            name = request.purpose.replace(" ", "_")
+            body["response_format"] = {
+                "type": "json_schema",
+                "json_schema": {"name": name, "strict": True, "schema": schema},
+            }
+        else:
+            text = f"Answer with JSON alone that fits this schema: {request.schema}"
+            messages.insert(0, {"role": "system", "content": text})
+        return body
+
+    def _told(self, error: BaseException) -> str:
+        """An error on one line, without the key."""
+        text = " ".join(str(error).split())
+        if self._key:
+            text = text.replace(self._key, "***")
+        return f"{type(error).__name__}: {text[:_LONGEST]}"
+
+    def _exchange(self, request: Request, got: _Got, tries: int, seconds: float) -> Exchange:
+        answer, problem = None, got.problem
+        sent = came = None
+        if not problem:
+            answer, problem, sent, came = _read(got.body)
+        if self._key and answer is not None:
+            answer = answer.replace(self._key, "***")
+        with self._lock:
+            self._tokens += (sent or 0) + (came or 0)
+        return Exchange(
+            request.purpose,
+            self.name,
+            request.key(self.name),
+            request.messages,
+            answer,
+            problem,
+            "",
+            len(request.images),
+            sent,
+            came,
+            self._cost(sent, came),
+            seconds,
+            tries,
+        )
+
+    def _cost(self, sent: int | None, came: int | None) -> float | None:
+        c = self._config
+        if sent is None or came is None or c.dollars_in is None or c.dollars_out is None:
+            return None
+        return (sent * c.dollars_in + came * c.dollars_out) / 1e6
+
+
+def _read(body: bytes) -> tuple[str | None, str, int | None, int | None]:
+    """A body → answer, problem, tokens of prompt and answer."""
+    try:
+        field = Field(parse_json(body.decode("utf-8")))
+        usage = field.value.get("usage") if isinstance(field.value, Mapping) else None
+        sent, came = (_count(usage, n) for n in ("prompt_tokens", "completion_tokens"))
+        choice = field["choices"].items()[0]
+        message = choice["message"]
+        refusal = message.value.get("refusal")
+        content = message.value.get("content")
+        ended = choice.value.get("finish_reason")
+    except (ForestallError, ValueError, LookupError, AttributeError) as error:
+        why = " ".join(str(error).split())[:_LONGEST]
+        return None, f"the endpoint's answer cannot be read: {why}", None, None
+    if refusal:
+        return None, f"the model refuses: {str(refusal)[:_LONGEST]}", sent, came
+    if not isinstance(content, str) or not content.strip():
+        return None, "the model's answer is empty", sent, came
+    if ended == "length":
+        return content, "the answer was cut off at its greatest length", sent, came
+    if ended == "content_filter":
+        return content, "the endpoint's filter stopped the answer", sent, came
+    return content, "", sent, came
+
+
+def _count(usage: Any, name: str) -> int | None:
+    value = usage.get(name) if isinstance(usage, Mapping) else None
+    good = isinstance(value, int) and not isinstance(value, bool) and value >= 0
+    return value if good else None
+
+
+def _data_url(jpeg: bytes) -> str:
+    return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode("ascii")
+
+
+def _asked_to_wait(headers: Mapping[str, str]) -> float | None:
+    """Seconds that an answer asks to wait (Retry-After), None where it does not."""
+    text = headers.get("retry-after")
+    if not text:
+        return None
+    try:
+        return max(0.0, float(text))
+    except ValueError:
+        pass
+    try:
+        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
+    except (ValueError, TypeError):
+        return None
+
+
+def _sleep(seconds: float, limit: Deadline) -> None:
+    until_s = time.monotonic() + seconds
+    while (left_s := until_s - time.monotonic()) > 0 and not limit.over:
+        time.sleep(min(_POLL_S, left_s))

@@ -1,0 +1,184 @@
+"""The client over real HTTP: whatever the endpoint does, an answer or a sentence, and in time."""
+
+import json
+import time
+
+import pytest
+
+from forestall.deadline import Deadline
+from forestall.errors import InputError
+from forestall.llm.client import ClientConfig, OpenAIModel
+from forestall.types.exchange import Exchange, Request
+from llm.server import Reply, Script, failed, in_turn, said, serving
+
+REQUEST = Request(
+    "reasoning", (("system", "be short"), ("user", "why?")), json.dumps({"type": "object"})
+)
+KEY = "sk-secret-0123456789"
+
+
+@pytest.fixture(autouse=True)
+def key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    monkeypatch.setenv("NO_PROXY", "*")
+
+
+def asked(script: Script, **options: object) -> tuple[Exchange, list[dict[str, object]]]:
+    with serving(script) as server:
+        config = ClientConfig(model="m", base_url=server.url, **options)  # type: ignore[arg-type]
+        return OpenAIModel(config).ask(REQUEST), server.asked
+
+
+def test_a_question_and_its_answer() -> None:
+    with serving(in_turn(said({"a": 1}))) as server:
+        model = OpenAIModel(
+            ClientConfig(model="m", base_url=server.url, dollars_in=2.0, dollars_out=10.0)
+        )
+        found = model.ask(REQUEST)
+    assert (found.answer, found.problem, found.tries) == ('{"a": 1}', "", 1)
+    assert (found.prompt_tokens, found.answer_tokens) == (300, 50)
+    assert found.cost == pytest.approx(300 * 2e-6 + 50 * 10e-6)
+    body = server.asked[0]
+    assert body["model"] == "m" and body["temperature"] == 0.0 and body["max_tokens"] == 1000
+    assert body["response_format"]["json_schema"] == {
+        "name": "reasoning", "strict": True, "schema": {"type": "object"},
+    }  # fmt: skip
+    assert server.keys == [f"Bearer {KEY}"]
+    assert KEY not in repr(found)
+
+
+def test_what_an_endpoint_does_not_say_is_unknown_and_not_zero() -> None:
+    found, _ = asked(in_turn(said("{}", prompt_tokens=7)))
+    assert (found.prompt_tokens, found.answer_tokens, found.cost) == (7, None, None)
+
+
+def test_pictures_go_with_the_first_message_of_the_user() -> None:
+    with serving(in_turn(said("{}"))) as server:
+        model = OpenAIModel(ClientConfig(model="m", base_url=server.url))
+        shown = Request("reasoning", REQUEST.messages, REQUEST.schema, (b"jpeg",))
+        assert model.ask(shown).images == 1
+    text, picture = server.asked[0]["messages"][1]["content"]
+    assert text == {"type": "text", "text": "why?"}
+    assert picture["image_url"]["url"] == "data:image/jpeg;base64,anBlZw=="
+    assert shown.key("m") != REQUEST.key("m")
+
+
+def test_an_endpoint_without_schemas_is_told_in_words() -> None:
+    _, bodies = asked(in_turn(said("{}")), schema=False, temperature=None)
+    assert "response_format" not in bodies[0] and "temperature" not in bodies[0]
+    assert '{"type": "object"}' in bodies[0]["messages"][0]["content"]  # type: ignore[index]
+
+
+@pytest.mark.parametrize("status", [408, 409, 429, 500, 503])
+def test_what_may_pass_is_tried_again(status: int) -> None:
+    found, bodies = asked(in_turn(failed(status, Retry_After="0"), said("{}")))
+    assert (found.problem, found.tries, len(bodies)) == ("", 2, 2)
+
+
+def test_what_does_not_pass_is_not_tried_again_and_no_message_tells_the_key() -> None:
+    found, bodies = asked(in_turn(failed(401, f"Incorrect API key provided: {KEY}")))
+    assert len(bodies) == 1 and "401" in found.problem
+    assert KEY not in found.problem and "***" in found.problem
+
+
+def test_it_waits_as_long_as_it_is_asked_to() -> None:
+    started = time.monotonic()
+    found, _ = asked(in_turn(failed(429, Retry_After="1"), said("{}")), timeout_s=30)
+    assert found.problem == "" and time.monotonic() - started >= 1
+
+
+def test_it_does_not_wait_longer_than_there_is_time() -> None:
+    started = time.monotonic()
+    found, bodies = asked(in_turn(failed(429, Retry_After="3600")), timeout_s=20)
+    assert len(bodies) == 1 and time.monotonic() - started < 20
+    assert "429" in found.problem and "asks to wait 3600 s" in found.problem
+
+
+def test_further_tries_are_bounded() -> None:
+    found, bodies = asked(in_turn(failed(500, Retry_After="0")), retries=2)
+    assert len(bodies) == 3 and found.tries == 3 and "500" in found.problem
+
+
+TRICKLE = Reply(pieces=(b" ",) * 400, pause_s=0.1)
+
+
+@pytest.mark.parametrize(
+    "reply", [Reply(wait_s=5, pieces=(b"{}",)), TRICKLE], ids=["silent", "a trickle"]
+)
+def test_a_slow_endpoint_costs_its_time_limit_and_no_more(reply: Reply) -> None:
+    started = time.monotonic()
+    found, _ = asked(in_turn(reply), timeout_s=1.0)
+    assert found.answer is None and found.problem
+    assert found.seconds < 2.0
+    assert time.monotonic() - started < 20
+
+
+def test_nobody_listening_is_told_in_time() -> None:
+    model = OpenAIModel(
+        ClientConfig(model="m", base_url="http://127.0.0.1:9/v1", timeout_s=10, retries=0)
+    )
+    started = time.monotonic()
+    found = model.ask(REQUEST)
+    assert found.answer is None and "cannot be reached" in found.problem
+    assert time.monotonic() - started < 10
+
+
+def test_a_deadline_of_the_caller_counts() -> None:
+    with serving(in_turn(Reply(wait_s=4, pieces=(b"{}",)))) as server:
+        model = OpenAIModel(ClientConfig(model="m", base_url=server.url, timeout_s=60))
+        started = time.monotonic()
+        assert model.ask(REQUEST, Deadline(0.5)).problem
+        assert time.monotonic() - started < 3
+        assert model.ask(REQUEST, Deadline(0.0)).tries == 0
+
+
+@pytest.mark.parametrize(
+    ("reply", "words"),
+    [
+        (Reply(pieces=(b'{"choices": [{"mess',), promised=500), "failed"),
+        (Reply(pieces=(b"x" * 2**20,)), "larger than"),
+        (Reply(pieces=(b"\xff\xfe",)), "cannot be read"),
+        (Reply(pieces=(b"{}",)), "cannot be read"),
+        (Reply(pieces=(b'{"choices": []}',)), "cannot be read"),
+        (Reply(pieces=(b'{"choices": [{"message": null}]}',)), "cannot be read"),
+        (Reply(pieces=(b"[" * 5000,)), "cannot be read"),
+        (said(None, refusal="I cannot help with that"), "refuses: I cannot help"),
+        (said(""), "empty"),
+        (said('{"a"', ended="length"), "cut off"),
+        (said("{}", ended="content_filter"), "filter"),
+    ],
+    ids=["cut", "megabyte", "no text", "no choices", "none", "null", "deep", "refusal", "empty",
+         "length", "filter"],
+)  # fmt: skip
+def test_an_answer_that_is_none_is_a_sentence(reply: Reply, words: str) -> None:
+    found, _ = asked(in_turn(reply), retries=0)
+    assert words in found.problem
+    assert found.answer is None or found.problem
+
+
+def test_a_budget_ends_the_asking() -> None:
+    with serving(in_turn(said("{}"))) as server:
+        model = OpenAIModel(ClientConfig(model="m", base_url=server.url, max_calls=2))
+        assert [bool(model.ask(REQUEST).problem) for _ in range(3)] == [False, False, True]
+        model = OpenAIModel(ClientConfig(model="m", base_url=server.url, max_tokens=400))
+        answers = [model.ask(REQUEST) for _ in range(3)]
+    assert [bool(a.problem) for a in answers] == [False, False, True]
+    assert "700 tokens of 400" in answers[2].problem and answers[2].tries == 0
+    assert len(server.asked) == 4
+
+
+@pytest.mark.parametrize(
+    "url", ["localhost:8000", "ftp://x/v1", "http://", "http://u:secret@host/v1", "http://h/?k=1"]
+)
+def test_an_address_that_is_none_or_holds_a_secret_is_refused(url: str) -> None:
+    with pytest.raises(InputError) as caught:
+        ClientConfig(base_url=url)
+    assert "secret@" not in str(caught.value)
+
+
+def test_without_a_key_and_an_address_there_is_nobody_to_ask(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY")
+    with pytest.raises(InputError, match="OPENAI_API_KEY is not set"):
+        OpenAIModel()
