@@ -14,6 +14,7 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.forgetting import remove
+from forestall.perception.foreground import own_pixels
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
 from forestall.perception.gate_config import GateConfig, WatchConfig
@@ -183,7 +184,7 @@ class GraphPerceiver:
         axis_m: Vec3,
         told: Collection[str],
     ) -> View:
-        detections, labels = masks.detections, masks.labels
+        detections = masks.detections
         states = self._estimator.estimate(frame, detections)
         if len(states) != len(detections):
             raise PerceptionError(
@@ -191,6 +192,7 @@ class GraphPerceiver:
                 f"{len(detections)} detections"
             )
         fixed = [self._is_fixture(d.category) for d in detections]
+        labels = own_pixels(frame, masks.labels, [not f for f in fixed], self._config)
         voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in fixed]
         found = clouds(frame, labels, voxel_m, self._config, [not f for f in fixed])
         if self._gate is not None:
