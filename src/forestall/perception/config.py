@@ -34,6 +34,11 @@ class PerceptionConfig:
         flat_m: how much higher a thing's middle must be for that: flat things keep their rims.
         level_share: share of what is around a foot that must lie in one level.
         ring_pixels: so many pixels at least.
+        lattice_px: every so many pixels are looked at for unmasked surfaces.
+        surface_cells: level cells of that lattice that make a surface.
+        surface_m: how far from its height they may lie (a pose that leans by a degree: 0.02).
+        foot_cells: cells of it that must show around the foot of what stands on it.
+        floor_slack_m: how far from the floor's height the floor may be seen.
         stray_gap_m: gap along the line of sight over which points of a mask are of two things.
         stray_share: share of a movable thing's pixels under which such a part is not its own
             (real masks, a pixel too wide: up to 0.08).
@@ -111,6 +116,11 @@ class PerceptionConfig:
     flat_m: float = 0.008
     level_share: float = 0.5
     ring_pixels: int = 12
+    lattice_px: int = 4
+    surface_cells: int = 60
+    surface_m: float = 0.025
+    foot_cells: int = 6
+    floor_slack_m: float = 0.1
     stray_gap_m: float = 0.08
     stray_share: float = 0.1
     box_percentile: float = 0.01

@@ -4,14 +4,15 @@ A mask has a core, which is well inside, and a rim. A piece of the rim belongs t
 goes on from the core to it, and to what is around if it goes on from outside and not from the core:
 to another thing's mask, or to what is behind. What lies in the level surface around the thing is
 that surface's, also at its foot, where depth goes on from both. Flying pixels are nobody's, unless
-they are as near to the core as the thing is wide. All masks of a picture are looked at together, large ones on the lattice
-on which they are unprojected. Called by the perceiver.
+they are as near to the core as the thing is wide. All masks of a picture are looked at together,
+large ones on the lattice on which they are unprojected. Called by the perceiver.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.unproject import Labels, rays, strides
+from forestall.perception.unproject import Labels, heights, rays, strides
 from forestall.types.observation import Depth, Frame
 
 Flags = npt.NDArray[np.bool_]
@@ -71,12 +72,12 @@ def own_pixels(
             kept = labels.copy()
         rows, columns = np.nonzero(gone)
         top, left = rim.top, rim.left
-        for down in range(step):
-            for across in range(step):
-                y = np.minimum((rows + top) * step + down, labels.shape[0] - 1)
-                x = np.minimum((columns + left) * step + across, labels.shape[1] - 1)
-                same = labels[y, x] == rim.labels[rows, columns]
-                kept[y[same], x[same]] = -1
+        around = range(1 - step, step)
+        for down, across in product(around, around):
+            y = np.clip((rows + top) * step + down, 0, labels.shape[0] - 1)
+            x = np.clip((columns + left) * step + across, 0, labels.shape[1] - 1)
+            same = labels[y, x] == rim.labels[rows, columns]
+            kept[y[same], x[same]] = -1
     return kept
 
 
@@ -154,8 +155,8 @@ class _Rim:
     def _reached(self, index: Index, noise: float) -> tuple[Flags, Flags, Flags]:
         """Of each pixel of the rim, whether its piece is joined to the core, or to what is around.
 
-        The last says whether what is around is another movable thing's mask. Neighbours are joined if no surface but a very steep one has the step between them, noise
-        allowed for.
+        The last says whether what is around is another movable thing's mask. Neighbours are joined
+        if no surface but a very steep one has the step between them, noise allowed for.
         """
         labels, depth = self.labels.ravel(), self.depth.ravel()
         core = self.core.ravel()
@@ -194,8 +195,8 @@ class _Rim:
         links = coo_matrix((np.ones(len(one), dtype=np.int8), (one, other)), shape=(size, size))
         pieces, piece = connected_components(links, directed=False)
         has = np.zeros((3, pieces), dtype=np.bool_)
-        for row, flags in enumerate((seeded, entered, by_thing)):
-            has[row, piece[flags]] = True
+        for which, flags in enumerate((seeded, entered, by_thing)):
+            has[which, piece[flags]] = True
         return has[0, piece], has[1, piece], has[2, piece]
 
     def _level(self, contested: Index, noise: float, gone: Flags) -> None:
@@ -207,31 +208,26 @@ class _Rim:
         owner = labels[order]
         starts = np.flatnonzero(np.diff(owner, prepend=-1))
         ends = np.append(starts[1:], len(order))
-        heights = self._heights()
+        high = self._heights()
         for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
             some = order[start:end]
-            around, rough_m, middle_m = self._around(int(owner[start]), some, heights)
+            around, rough_m, middle_m = self._around(int(owner[start]), some, high)
             if around is None:
                 continue
             far = float(np.median(depth[some]))
             slack = max(self.config.level_m, 2.5 * noise * far * far, 2.5 * rough_m)
             if middle_m - around > slack + self.config.flat_m:
-                gone[some[np.abs(heights.ravel()[some] - around) <= slack]] = True
+                gone[some[np.abs(high.ravel()[some] - around) <= slack]] = True
 
     def _heights(self) -> Floats:
         """(h, w) height in the world."""
-        row = self.frame.camera_to_world[2].astype(np.float32)
         height, width = self.labels.shape
+        every = self.step
         x, y = rays(self.frame.intrinsics)
-        x = x[:: self.step][self.left : self.left + width]
-        y = y[:: self.step][self.top : self.top + height]
-        heights: Floats = self.depth * ((x * row[0])[None, :] + (y * row[1] + row[2])[:, None])
-        heights += row[3]
-        return heights
+        x, y = x[::every][self.left :][:width], y[::every][self.top :][:height]
+        return heights(self.depth, x, y, self.frame.camera_to_world)
 
-    def _around(
-        self, label: int, some: Index, heights: Floats
-    ) -> tuple[float | None, float, float]:
+    def _around(self, label: int, some: Index, high: Floats) -> tuple[float | None, float, float]:
         """Height of the level surface around a mask, None where there is none, and its roughness.
 
         The last is the height of the middle of the mask.
@@ -247,9 +243,9 @@ class _Rim:
         mine = (self.labels[box] == label) & self.core[box]
         if not mine.any():
             return None, 0.0, 0.0
-        own = heights[box][mine]
+        own = high[box][mine]
         low, middle = float(own.min()), float(np.median(own))
-        near = heights[box][beside]
+        near = high[box][beside]
         near = near[np.abs(near - low) < config.ring_m]
         if len(near) < config.ring_pixels:
             return None, 0.0, middle

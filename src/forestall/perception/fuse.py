@@ -21,6 +21,7 @@ from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
 from forestall.perception.support import Parent, circular, parents
+from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import (
     Fate,
     Fates,
@@ -30,6 +31,7 @@ from forestall.perception.tracks import (
     fates,
     gap_m,
     interior_observed,
+    lies_in,
     middle,
     riding,
     thinned,
@@ -89,6 +91,7 @@ class SceneMemory:
         was = {t.id for t in before}
         gone = {n for n in was - kept if not self._is_fixture(self.tracks[n].category)}
         merge_renamed(self.tracks, gone, seen - was, self._config)
+        self._name_surfaces(seen)
         self._forget_gone(fate, seen, moved, views)
         self._replace_cut(seen, fate, former, observation.time_s)
         self.forgotten = let_go(self.tracks, kept, self._config)
@@ -240,6 +243,18 @@ class SceneMemory:
             if share >= self._config.gone_share and expected_pixels(track, views) >= enough:
                 track.lose()
 
+    def _name_surfaces(self, seen: set[str]) -> None:
+        """A surface that is not seen gives way to the furniture that is seen in its place."""
+        for name in [n for n, t in sorted(self.tracks.items()) if t.category == SURFACE]:
+            surface = self.tracks[name]
+            if name in seen or surface.points_world_m is None:
+                continue
+            for other in sorted(seen):
+                track = self.tracks[other]
+                if self._is_fixture(track.category) and lies_in(surface, track, self._config):
+                    remove(self.tracks, name, other)
+                    break
+
     def _replace_cut(
         self, seen: set[str], fate: Mapping[str, Fates], former: str | None, time_s: float
     ) -> None:
@@ -377,10 +392,10 @@ class SceneMemory:
     # --- small questions ------------------------------------------------------------------------
 
     def _is_fixture(self, category: str) -> bool:
-        return self._domain.is_a(category, self._domain.roles.fixture)
+        return fixed(self._domain, category)
 
     def _is_large_support(self, category: str) -> bool:
-        return self._domain.is_open_support(category)
+        return category == SURFACE or self._domain.is_open_support(category)
 
     def _closed(self, track: Track) -> bool:
         return is_shut(self._domain, track.category, track.states) is Truth.TRUE

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.perception.config import PerceptionConfig
-from forestall.types.observation import Detection, Frame, Intrinsics, Pose
+from forestall.types.observation import Depth, Detection, Frame, Intrinsics, Pose
 
 Points = npt.NDArray[np.float64]
 Labels = npt.NDArray[np.int16]
@@ -67,6 +67,19 @@ def rays(k: Intrinsics) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32
     x = (np.arange(k.width, dtype=np.float32) - np.float32(k.cx)) / np.float32(k.fx)
     y = (np.arange(k.height, dtype=np.float32) - np.float32(k.cy)) / np.float32(k.fy)
     return x, y
+
+
+def heights(
+    depth_m: Depth,
+    x: npt.NDArray[np.float32],
+    y: npt.NDArray[np.float32],
+    camera_to_world: Pose,
+) -> npt.NDArray[np.float32]:
+    """(h, w) height in the world of each pixel; x and y are those of its ray at z = 1."""
+    row = camera_to_world[2].astype(np.float32)
+    along = (x * row[0])[None, :] + (y * row[1] + row[2])[:, None]
+    found: npt.NDArray[np.float32] = depth_m * along + row[3]
+    return found
 
 
 @lru_cache(maxsize=4)
