@@ -95,6 +95,7 @@ class _Rim:
         movable: whether each mask is of a thing that can be moved.
         rim: (h, w) pixels of these masks near their outline.
         core: (h, w) pixels of these masks well inside.
+        blind: (h, w) pixels near the outline without depth that stand for others, which may have it.
         config: thresholds.
     """
 
@@ -107,6 +108,7 @@ class _Rim:
     movable: Flags
     rim: Flags
     core: Flags
+    blind: Flags
     config: PerceptionConfig
 
     @classmethod
@@ -135,7 +137,9 @@ class _Rim:
         wide = -(-config.rim_px // step)
         level = _levels(thin, deep, inside, len(meant), wide, config)
         core: Flags = inside & (deep >= np.append(level, 0)[thin])
-        return cls(frame, thin, depth, top, left, step, movable, inside & ~core, core, config)
+        blind = mine & (depth <= 0) & (deep < wide) & (step > 1)
+        rim = inside & ~core
+        return cls(frame, thin, depth, top, left, step, movable, rim, core, blind, config)
 
     def foreign(self, noise: float) -> Flags | None:
         """(h, w) pixels of the rim that are not their thing's own, None for none."""
@@ -143,7 +147,7 @@ class _Rim:
         if len(index) == 0:
             return None
         from_core, from_outside, from_thing = self._reached(index, noise)
-        gone = np.zeros(self.labels.shape, dtype=np.bool_)
+        gone = self.blind.copy()
         flat = gone.ravel()
         apart = ~from_core
         flat[index[apart & from_thing]] = True
