@@ -95,7 +95,7 @@ class _Rim:
         movable: whether each mask is of a thing that can be moved.
         rim: (h, w) pixels of these masks near their outline.
         core: (h, w) pixels of these masks well inside.
-        blind: (h, w) pixels near the outline without depth that stand for others, which may have it.
+        blind: (h, w) pixels near the outline without depth, which stand for others.
         config: thresholds.
     """
 
