@@ -38,6 +38,8 @@ class PerceptionConfig:
         surface_cells: level cells of that lattice that make a surface.
         surface_m: how far from its height they may lie (a pose that leans by a degree: 0.02).
         foot_cells: cells of it that must show around the foot of what stands on it.
+        foot_share: share of what shows around a foot that they must be: in a heap nothing tells on
+            what a thing lies.
         floor_slack_m: how far from the floor's height the floor may be seen.
         stray_gap_m: gap along the line of sight over which points of a mask are of two things.
         stray_share: share of a movable thing's pixels under which such a part is not its own
@@ -120,6 +122,7 @@ class PerceptionConfig:
     surface_cells: int = 60
     surface_m: float = 0.025
     foot_cells: int = 6
+    foot_share: float = 0.35
     floor_slack_m: float = 0.1
     stray_gap_m: float = 0.08
     stray_share: float = 0.1

@@ -169,12 +169,13 @@ def _foot(
     ]
     p = look.points_m[box]
     reach = 2 * config.ring_m
-    near = (p[..., 2] >= low[2] - config.contact_below_m) & look.known[box]
+    beside = look.known[box] & (look.labels[box] != thing)
+    beside &= ((p[..., :2] >= low[:2] - reach) & (p[..., :2] <= high[:2] + reach)).all(axis=-1)
+    near = beside & (p[..., 2] >= low[2] - config.contact_below_m)
     near &= p[..., 2] <= low[2] + config.contact_above_m
-    near &= ((p[..., :2] >= low[:2] - reach) & (p[..., :2] <= high[:2] + reach)).all(axis=-1)
     free = near & level[box]
-    masked = near & (look.labels[box] >= 0) & (look.labels[box] != thing)
-    if int(free.sum()) < config.foot_cells or int(masked.sum()) > int(free.sum()):
+    least = max(config.foot_cells, config.foot_share * int(beside.sum()))
+    if int(free.sum()) < least or int((near & (look.labels[box] >= 0)).sum()) > int(free.sum()):
         return None
     around = np.zeros(level.shape, dtype=np.bool_)
     around[box] = free
