@@ -163,3 +163,10 @@ def test_the_noise_of_depth_is_told_from_its_edges() -> None:
     z = frame.depth_m.astype(np.float64)
     z += np.random.default_rng(0).normal(0.0, 0.003, z.shape) * z**2
     assert noise_share(z.astype(np.float32)) == pytest.approx(0.003, rel=0.15)
+
+
+def test_a_surface_gives_way_to_the_mask_of_another_view() -> None:
+    both = replace(seen(), frames=(seen(unmasked={"DiningTable-1"}).frames[0], seen().frames[0]))
+    graph = graph_of(both)
+    assert ("Mug-1", "on_top_of", "DiningTable-1") in facts(graph, "on_top_of")
+    assert [n.id for n in graph.nodes if n.category == SURFACE] == []

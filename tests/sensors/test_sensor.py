@@ -13,7 +13,9 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.sensors import DEPTH_CAMERAS, REALISTIC, Errors, Sensor, SensorPart
 from forestall.sensors.masks import miscalled, moved_outlines, without
 from forestall.tasks.edge import WorldsEdge
+from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.observation import Depth, Intrinsics, Observation
+from forestall.types.plan import Subtask
 from perception.rooms import room
 
 CAMERA = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -182,8 +184,8 @@ class _Still:
     def approach(self, name: str) -> float:
         return 0.0
 
-    def execute(self, subtask: object) -> object:
-        raise NotImplementedError
+    def execute(self, subtask: Subtask) -> SkillOutcome:
+        return SkillOutcome(SkillStatus.REFUSED, 0.0, "nothing happens here")
 
     def hold(self) -> None: ...
     def close(self) -> None: ...

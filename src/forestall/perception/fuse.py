@@ -15,7 +15,7 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.forgetting import let_go, merge_renamed, remove
+from forestall.perception.forgetting import give_way, let_go, merge_renamed, remove
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
@@ -31,7 +31,6 @@ from forestall.perception.tracks import (
     fates,
     gap_m,
     interior_observed,
-    lies_in,
     middle,
     riding,
     thinned,
@@ -91,7 +90,7 @@ class SceneMemory:
         was = {t.id for t in before}
         gone = {n for n in was - kept if not self._is_fixture(self.tracks[n].category)}
         merge_renamed(self.tracks, gone, seen - was, self._config)
-        self._name_surfaces(seen)
+        seen -= give_way(self.tracks, seen, self._domain, self._config)
         self._forget_gone(fate, seen, moved, views)
         self._replace_cut(seen, fate, former, observation.time_s)
         self.forgotten = let_go(self.tracks, kept, self._config)
@@ -242,18 +241,6 @@ class SceneMemory:
             share = float((fate[name] == Fate.GONE).mean())
             if share >= self._config.gone_share and expected_pixels(track, views) >= enough:
                 track.lose()
-
-    def _name_surfaces(self, seen: set[str]) -> None:
-        """A surface that is not seen gives way to the furniture that is seen in its place."""
-        for name in [n for n, t in sorted(self.tracks.items()) if t.category == SURFACE]:
-            surface = self.tracks[name]
-            if name in seen or surface.points_world_m is None:
-                continue
-            for other in sorted(seen):
-                track = self.tracks[other]
-                if self._is_fixture(track.category) and lies_in(surface, track, self._config):
-                    remove(self.tracks, name, other)
-                    break
 
     def _replace_cut(
         self, seen: set[str], fate: Mapping[str, Fates], former: str | None, time_s: float

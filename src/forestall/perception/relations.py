@@ -74,16 +74,16 @@ def directions(
             hits = np.argwhere(close & applies & (sign * cosine[:, :, axis] > 0))
             found += [Relation(ids[i], predicate, ids[j]) for i, j in hits]
     near = pair & (gap <= config.near_m)
-    for i, j in np.argwhere(np.triu(near)):
+    for i, j in np.argwhere(np.triu(near & (gap <= 0.0))):
         near[i, j] = near[j, i] = _beside(stack, int(i), int(j), config)
     found += [Relation(ids[i], "near", ids[j]) for i, j in np.argwhere(near)]
     return found
 
 
 def _beside(stack: Stack, i: int, j: int, config: PerceptionConfig) -> bool:
-    """Whether two things are nearer to each other than most of the smaller one's length.
+    """Whether things whose boxes overlap are near by their surfaces and the smaller one's length.
 
-    Not only their boxes: in a heap every box overlaps every other.
+    In a heap every box overlaps every other.
     """
     one, other = (sampled(stack.samples[k], _FEW) for k in (i, j))
     size = min(float((stack.high_m[k] - stack.low_m[k]).max()) for k in (i, j))

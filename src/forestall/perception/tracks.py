@@ -188,15 +188,6 @@ def gap_m(one: Track, other: Track) -> float:
     return float(np.linalg.norm(np.maximum(apart, 0.0)))
 
 
-def lies_in(surface: Track, track: Track, config: PerceptionConfig) -> bool:
-    """Whether most of what is known of one thing lies within the box of another."""
-    if surface.points_world_m is None or track.points_world_m is None:
-        return False
-    p = surface.points_world_m
-    within = (p >= track.low_m - config.surface_m) & (p <= track.high_m + config.surface_m)
-    return float(within.all(axis=1).mean()) >= config.covered_share
-
-
 def thinned(points: Points, voxel_m: float) -> Points:
     """One point for each voxel (the first, that is the newest), at most a fixed number."""
     cell = np.floor(points / voxel_m).astype(np.int64) + (1 << 19)

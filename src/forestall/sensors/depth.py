@@ -53,10 +53,10 @@ def stereo(depth_m: Depth, camera: Intrinsics, rng: np.random.Generator) -> Dept
 
 def structured_light(depth_m: Depth, camera: Intrinsics, rng: np.random.Generator) -> Depth:
     """A Kinect: pixels sideways, axial noise, steps of disparity, a shadow at edges."""
-    rows, columns = np.indices(depth_m.shape)
-    rows = np.rint(rows + rng.normal(0, _SIDEWAYS_PX, rows.shape)).astype(np.int64)
-    columns = np.rint(columns + rng.normal(0, _SIDEWAYS_PX, columns.shape)).astype(np.int64)
-    rows, columns = rows.clip(0, len(rows) - 1), columns.clip(0, columns.shape[1] - 1)
+    height, width = depth_m.shape
+    up, sideways = rng.normal(0, _SIDEWAYS_PX, (2, height, width))
+    rows = np.rint(np.arange(height)[:, None] + up).astype(np.int64).clip(0, height - 1)
+    columns = np.rint(np.arange(width)[None, :] + sideways).astype(np.int64).clip(0, width - 1)
     z = depth_m[rows, columns].astype(np.float64)
     z += rng.normal(size=z.shape) * (0.0012 + 0.0019 * (z - 0.4) ** 2)
     reach = camera.fx * _LIGHT_BASELINE_M

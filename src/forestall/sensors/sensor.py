@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -138,7 +139,7 @@ def _exposed(rgb: Rgb, errors: Errors, rng: np.random.Generator) -> Rgb:
     """Colours with exposure, motion blur and noise."""
     if errors.gain == 0 and errors.blur_px == 0 and errors.colour_noise == 0:
         return rgb
-    values: npt.NDArray[np.float64] = rgb * (1 + errors.gain * rng.uniform(-1, 1))
+    values: npt.NDArray[np.floating[Any]] = rgb * (1 + errors.gain * rng.uniform(-1, 1))
     if errors.blur_px > 1:
         values = ndimage.uniform_filter1d(values, errors.blur_px, axis=1)
     values = values + errors.colour_noise * rng.normal(size=rgb.shape)
