@@ -11,6 +11,7 @@ from forestall.seams import (
     Captioner,
     DemonstrationStore,
     Detector,
+    Eye,
     ImageTextEncoder,
     LanguageModel,
     Perceiver,
@@ -28,6 +29,7 @@ from forestall.supervision import Limits
 from forestall.types.kind import Kind
 
 WORLD = Kind[WorldPart]("world", WorldPart)
+SENSOR = Kind[Eye]("sensor", Eye)
 DOMAIN = Kind[Domain]("domain", Domain)
 SEGMENTER = Kind[Segmenter]("segmenter", Segmenter)
 STATES = Kind[StateEstimator]("states", StateEstimator)

@@ -164,6 +164,17 @@ class WorldPart(Protocol):
         """What of it works on this machine."""
 
 
+class Eye(Protocol):
+    """What a robot looks through: makes what it sees of what is there to be seen."""
+
+    @property
+    def identities(self) -> bool:
+        """Whether masks tell which thing they show, and not only its category."""
+
+    def around(self, environment: Environment) -> Environment:
+        """The same world, seen through it."""
+
+
 class Parts(Protocol):
     """What a part may borrow while it is built: its factory's first argument, called `parts`."""
 

@@ -23,7 +23,7 @@ from forestall.assembly.registry import find, known
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.kinds import LIMIT, PERCEIVER, STATES, STRATEGY, WORLD
+from forestall.kinds import LIMIT, PERCEIVER, SENSOR, STATES, STRATEGY, WORLD
 from forestall.runtime import Runtime, RuntimeConfig
 from forestall.seams import Environment, Listener, OpenWorld, OracleView, Strategy, WorldPart
 from forestall.tasks.edge import WorldsEdge, named
@@ -178,12 +178,14 @@ def run_episode(
 
 
 def make_environment(prepared: Prepared, world: OpenWorld) -> Environment:
-    """What the robot gets of an open world: its faults, and an edge where names stay inside."""
+    """What the robot gets of an open world: its faults, its sensor, an edge where names end."""
     domain = prepared.loaded.domain
     faulty = wrap(world.environment, prepared.faults, world.disturbance, domain)
-    if getattr(world, "shares_names", True):
-        return faulty
-    return WorldsEdge(faulty, world.oracle.truth, domain, named(prepared.plan))
+    eye = Assembly(prepared.config.choices, domain).part(SENSOR)
+    seen = eye.around(faulty)
+    if getattr(world, "shares_names", True) and eye.identities:
+        return seen
+    return WorldsEdge(seen, world.oracle.truth, domain, named(prepared.plan))
 
 
 def make_runtime(

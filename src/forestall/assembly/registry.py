@@ -58,6 +58,14 @@ TABLES: Mapping[str, Table] = {
             },
         ),
         Table(
+            kinds.SENSOR,
+            "perfect",
+            {
+                name: f"{_SEEING}:{name}"
+                for name in ("kinect", "perfect", "realistic", "realsense", "tof")
+            },
+        ),
+        Table(
             kinds.DOMAIN,
             "household",
             {"bench": f"{_SEEING}:bench", "household": f"{_SEEING}:household"},

@@ -5,7 +5,9 @@ Named in `registry`, called through `parts`; calls perception and embeddings.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
+from typing import Annotated
 
 from forestall.assembly.registry import default
 from forestall.comparison.options import Feature, ScoreConfig
@@ -23,8 +25,13 @@ from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
 from forestall.planning.altered import altered
 from forestall.seams import ImageTextEncoder, OracleView, Parts
+from forestall.sensors import REALISTIC, Errors, SensorPart
+from forestall.types.kind import Settled
 
 _PERCEPTION, _SCORE = PerceptionConfig(), ScoreConfig()
+
+_Further = Annotated[Errors | None, Settled("depth")]
+"""Errors besides those of a camera's depth."""
 
 STATE_ENCODERS = {"learned": default(IMAGE_ENCODER), "clip": "clip"}
 """The image-text encoder behind each estimator that reads pixels."""
@@ -38,6 +45,31 @@ def instance_ids(*, min_pixels: int = _PERCEPTION.min_pixels) -> InstanceSegment
 def given_masks(*, min_pixels: int = _PERCEPTION.min_pixels) -> GivenMasks:
     """The masks that a stored observation comes with."""
     return GivenMasks(PerceptionConfig(min_pixels=min_pixels))
+
+
+def perfect(parts: Parts, *, errors: Errors | None = None) -> SensorPart:
+    """Pictures as they are drawn, unless errors are given."""
+    return SensorPart(errors or Errors(), parts.domain)
+
+
+def realsense(parts: Parts, *, errors: _Further = None) -> SensorPart:
+    """An active stereo camera (RealSense D400)."""
+    return SensorPart(replace(errors or Errors(), depth="realsense"), parts.domain)
+
+
+def kinect(parts: Parts, *, errors: _Further = None) -> SensorPart:
+    """A structured-light camera (the first Kinect)."""
+    return SensorPart(replace(errors or Errors(), depth="kinect"), parts.domain)
+
+
+def tof(parts: Parts, *, errors: _Further = None) -> SensorPart:
+    """A time-of-flight camera (the second Kinect)."""
+    return SensorPart(replace(errors or Errors(), depth="tof"), parts.domain)
+
+
+def realistic(parts: Parts) -> SensorPart:
+    """A stereo camera on a robot, and a detector without identities: all errors, moderately."""
+    return SensorPart(REALISTIC, parts.domain)
 
 
 def learned(parts: Parts) -> LearnedStateEstimator:

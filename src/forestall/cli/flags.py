@@ -30,6 +30,8 @@ class SeeingFlags:
 
     Args:
         world: where the robot acts: a name, or package.module:Class.
+        sensor: what the robot looks through: perfect, realsense, kinect, tof or realistic (stereo
+            noise, pose and mask errors, no identities).
         domain: what the task is read in: a name, or a file (.toml, .pddl); its own by default.
         states: where object states come from: learned (pixels, by the shipped encoder), clip
             (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
@@ -43,6 +45,7 @@ class SeeingFlags:
     """
 
     world: str | None = None
+    sensor: str | None = None
     domain: str | None = None
     states: str | None = None
     feature: str | None = None

@@ -94,12 +94,13 @@ class Description:
 
 
 def _reading(field: Field) -> StateReading:
-    scale, divisor, least, area = (f.name for f in fields(StateReading))
+    scale, divisor, least, area, contrast = (f.name for f in fields(StateReading))
     found = StateReading(
         field[scale].number(),
         *(dict(field.optional(k, lambda f: f.pairs(Field.number)) or ()) for k in (divisor, least)),  # type: ignore[arg-type]
     )
     least_area = field.optional(area, Field.whole)
+    found = replace(found, least_contrast=field.maybe(contrast, Field.number))
     return found if least_area is None else replace(found, least_area=least_area)
 
 

@@ -18,9 +18,12 @@ from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import Stack
 from forestall.perception.support import CONTAINMENT, Parent
+from forestall.perception.surfaces import SURFACE
 from forestall.perception.unproject import Labels, Points
 from forestall.types.graph import Relation
 from forestall.types.observation import Depth, Vec3
+
+_STEEP = 0.25  # how far beside a surface, by its height over it, a robot stands at least
 
 
 def cuts(
@@ -77,7 +80,7 @@ def blocking(
     found = []
     eye = np.asarray(eye_world_m)
     for (predicate, support), names in beside.items():
-        if len(names) < 2:
+        if len(names) < 2 or _from_straight_above(stack, index[support], eye):
             continue
         if domain.predicates[predicate].geometry == CONTAINMENT:
             axes = _opening(stack, index[support], [index[n] for n in names], eye, config)
@@ -153,6 +156,14 @@ def _extent(stack: Stack, i: int, axes: Axes, domain: Domain) -> tuple[float, ..
     size = None if category is None else category.size_m
     tall = top if not size else max(top, foot + float(size[2]))
     return (float(low[0]), float(high[0]), float(low[1]), float(high[1]), foot, tall)
+
+
+def _from_straight_above(stack: Stack, support: int, eye_world_m: Points) -> bool:
+    """Whether nothing tells from where a hand comes: a bare surface, seen from above it."""
+    if stack.things[support].category != SURFACE:
+        return False
+    away = np.maximum(stack.low_m[support] - eye_world_m, eye_world_m - stack.high_m[support])
+    return bool(np.linalg.norm(np.maximum(away[:2], 0.0)) < _STEEP * away[2])
 
 
 def _from_above(stack: Stack, support: int, target: int, config: PerceptionConfig) -> bool:

@@ -24,6 +24,23 @@ class PerceptionConfig:
         fixture_voxel_m: the same for furniture, which is large.
         min_cell_support: pixels in a 4-voxel cell and its six neighbours below which the cell is
             an outlier (flying pixels at depth edges).
+        rim_px: how far a mask may bleed over its thing's outline (masks drawn by hand: 2 to 4).
+        core_share: share of a mask that must be left as its core, else the rim is thinner.
+        steep: depth per width of a pixel above which neighbours lie on two surfaces (80 degrees).
+        edge_m: the same for pixels that are next to each other in space: least step of an edge.
+        behind_m: how far behind the core a piece of the rim may lie that is joined to what is
+            around and not to the core.
+        level_m: how far from a level surface a pixel counts as of it, noise apart.
+        flat_m: how much higher a thing's middle must be for that: flat things keep their rims.
+        level_share: share of what is around a foot that must lie in one level.
+        ring_pixels: so many pixels at least.
+        lattice_px: every so many pixels are looked at for unmasked surfaces.
+        surface_cells: level cells of that lattice that make a surface.
+        surface_m: how far from its height they may lie (a pose that leans by a degree: 0.02).
+        foot_cells: cells of it that must show around the foot of what stands on it.
+        foot_share: share of what shows around a foot that they must be: in a heap nothing tells on
+            what a thing lies.
+        floor_slack_m: how far from the floor's height the floor may be seen.
         stray_gap_m: gap along the line of sight over which points of a mask are of two things.
         stray_share: share of a movable thing's pixels under which such a part is not its own
             (real masks, a pixel too wide: up to 0.08).
@@ -92,6 +109,21 @@ class PerceptionConfig:
     voxel_m: float = 0.008
     fixture_voxel_m: float = 0.02
     min_cell_support: int = 4
+    rim_px: int = 9
+    core_share: float = 0.25
+    steep: float = 6.0
+    edge_m: float = 0.004
+    behind_m: float = 0.01
+    level_m: float = 0.003
+    flat_m: float = 0.008
+    level_share: float = 0.5
+    ring_pixels: int = 12
+    lattice_px: int = 4
+    surface_cells: int = 60
+    surface_m: float = 0.025
+    foot_cells: int = 6
+    foot_share: float = 0.35
+    floor_slack_m: float = 0.1
     stray_gap_m: float = 0.08
     stray_share: float = 0.1
     box_percentile: float = 0.01

@@ -1,4 +1,4 @@
-"""What the memory of a scene lets go: one thing under two names, things long lost, things too many.
+"""What the memory of a scene lets go: one thing under two names, things long lost or too many.
 
 Called by `fuse.py` on all that is remembered. A tracker that gives the same things new names at
 every look would else fill the memory with things that are nowhere.
@@ -10,7 +10,9 @@ from collections.abc import Collection
 
 import numpy as np
 
+from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
+from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import Track
 from forestall.types.graph import Seen
 
@@ -51,6 +53,34 @@ def merge_renamed(
             tracks[new].states = {**known, **tracks[new].states}
             tracks[new].interior_seen |= tracks[old].interior_seen
             remove(tracks, old, new)
+
+
+def give_way(
+    tracks: Tracks, seen: Collection[str], domain: Domain, config: PerceptionConfig
+) -> set[str]:
+    """Surfaces are taken out where furniture is seen in their place, in this view or another.
+
+    Returns:
+        Their names.
+    """
+    kinds = {n: tracks[n].category for n in sorted(seen)}
+    furniture = [n for n, c in kinds.items() if c != SURFACE and fixed(domain, c)]
+    gone: set[str] = set()
+    for name in [n for n, t in sorted(tracks.items()) if t.category == SURFACE]:
+        heir = next((n for n in furniture if _lies_in(tracks[name], tracks[n], config)), None)
+        if heir is not None:
+            remove(tracks, name, heir)
+            gone.add(name)
+    return gone
+
+
+def _lies_in(surface: Track, track: Track, config: PerceptionConfig) -> bool:
+    """Whether most of what is known of one thing lies within the box of another."""
+    p = surface.points_world_m
+    if p is None or track.points_world_m is None:
+        return False
+    within = (p >= track.low_m - config.surface_m) & (p <= track.high_m + config.surface_m)
+    return float(within.all(axis=1).mean()) >= config.covered_share
 
 
 def let_go(tracks: Tracks, kept: Collection[str], config: PerceptionConfig) -> tuple[str, ...]:

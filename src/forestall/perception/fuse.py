@@ -15,12 +15,13 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.forgetting import let_go, merge_renamed, remove
+from forestall.perception.forgetting import give_way, let_go, merge_renamed, remove
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
 from forestall.perception.support import Parent, circular, parents
+from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import (
     Fate,
     Fates,
@@ -89,6 +90,7 @@ class SceneMemory:
         was = {t.id for t in before}
         gone = {n for n in was - kept if not self._is_fixture(self.tracks[n].category)}
         merge_renamed(self.tracks, gone, seen - was, self._config)
+        seen -= give_way(self.tracks, seen, self._domain, self._config)
         self._forget_gone(fate, seen, moved, views)
         self._replace_cut(seen, fate, former, observation.time_s)
         self.forgotten = let_go(self.tracks, kept, self._config)
@@ -377,10 +379,10 @@ class SceneMemory:
     # --- small questions ------------------------------------------------------------------------
 
     def _is_fixture(self, category: str) -> bool:
-        return self._domain.is_a(category, self._domain.roles.fixture)
+        return fixed(self._domain, category)
 
     def _is_large_support(self, category: str) -> bool:
-        return self._domain.is_open_support(category)
+        return category == SURFACE or self._domain.is_open_support(category)
 
     def _closed(self, track: Track) -> bool:
         return is_shut(self._domain, track.category, track.states) is Truth.TRUE

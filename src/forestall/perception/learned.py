@@ -1,9 +1,10 @@
 """States read off the pixels: each object's crop against phrases, the most fitting one wins.
 
-Called by the perceiver; calls an image-text encoder that is handed in. This is the paper's way of
-reading states (Sec. 3 "3D Scene Graph Construction": CLIP on the crop against a list of states for
-each category), with a calibrated confidence, and silence where that is too small: an object that
-is too far away, too hidden, or fits two phrases about as well is *unobserved*, never guessed.
+Called by the perceiver; calls `kind.py`, and an image-text encoder that is handed in. This is the
+paper's way of reading states (Sec. 3 "3D Scene Graph Construction": CLIP on the crop against a list
+of states for each category), with a calibrated confidence, and silence where that is too small: an
+object that is too far away, too hidden, or fits two phrases about as well is *unobserved*, never
+guessed; so is everything in a picture unlike those that the encoder was made for.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError
+from forestall.perception.kind import of_its_kind
 from forestall.seams import ImageTextEncoder
 from forestall.types.observation import Detection, Frame
 
@@ -51,7 +53,10 @@ class LearnedStateEstimator:
     def estimate(
         self, frame: Frame, detections: Sequence[Detection]
     ) -> Sequence[Mapping[str, str | None]]:
-        """See the Protocol; a category that the domain lacks has no states."""
+        """See the Protocol; a category that the domain lacks has no states.
+
+        Of a picture unlike those that the encoder was made for nothing is told.
+        """
         asked = [
             (i, self.questions(d.category))
             for i, d in enumerate(detections)
@@ -59,7 +64,8 @@ class LearnedStateEstimator:
         ]
         asked = [(i, questions) for i, questions in asked if questions]
         least = self._encoder.reading.least_area
-        large = [(i, q) for i, q in asked if np.count_nonzero(detections[i].mask) >= least]
+        kind = asked and of_its_kind(frame.rgb, self._encoder.reading.least_contrast)
+        large = [(i, q) for i, q in asked if kind and np.count_nonzero(detections[i].mask) >= least]
         rows = self._encoder.encode_crops(frame.rgb, [detections[i].mask for i, _ in large])
         out: list[Mapping[str, str | None]] = [{} for _ in detections]
         for i, questions in asked:

@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 from forestall.domain.model import Domain
 from forestall.perception.forgetting import Tracks
 from forestall.perception.naming import Known, of_one_piece, unused
+from forestall.perception.surfaces import fixed
 from forestall.perception.tracks import Track, View, middle, riding
 from forestall.perception.unproject import Points
 from forestall.types.facts import category_of, is_instance
@@ -74,8 +75,8 @@ def known(
     """
     if category not in kinds:
         return Known(centroid_m)
-    fixed, ground = (domain.is_a(category, r) for r in (domain.roles.fixture, domain.roles.ground))
-    return replace(Known.of(points_m, centroid_m, fixed), only=ground)
+    ground = domain.is_a(category, domain.roles.ground)
+    return replace(Known.of(points_m, centroid_m, fixed(domain, category)), only=ground)
 
 
 def expected(

@@ -13,6 +13,7 @@ from dataclasses import replace
 from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.foreground import own_pixels
 from forestall.perception.forgetting import remove
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
@@ -21,6 +22,7 @@ from forestall.perception.gate_time import SenseWatch
 from forestall.perception.naming import Known, name_detections
 from forestall.perception.own_names import expected, join_parts, known, named_hands
 from forestall.perception.scope import scope
+from forestall.perception.surfaces import fixed, with_surfaces
 from forestall.perception.tracks import View
 from forestall.perception.unproject import (
     Cloud,
@@ -107,6 +109,10 @@ class GraphPerceiver:
         masked = self._masks(observation)
         tracks, held = self._memory.tracks, self._memory.held
         observation = named_hands(observation, tracks, held, self._domain)
+        masked = [
+            self._cut_out(observation, f, m)
+            for f, m in zip(observation.frames, masked, strict=True)
+        ]
         views = self._views(observation, masked)
         self._memory.integrate(observation, views)
         if self._memory.forgotten:
@@ -148,6 +154,24 @@ class GraphPerceiver:
             refuse(self.findings)
         return masks
 
+    def _cut_out(self, observation: Observation, frame: Frame, masks: Masks) -> Masks:
+        """Masks without what is not their thing's own, and surfaces that nothing masks."""
+        movable = [not fixed(self._domain, d.category) for d in masks.detections]
+        labels = own_pixels(frame, masks.labels, movable, self._config)
+        if frame.colour_only:
+            return masks
+        furniture = [
+            (t.low_m, t.high_m)
+            for t in self._memory.tracks.values()
+            if t.points_world_m is not None and fixed(self._domain, t.category)
+        ]
+        floor_m = observation.robot_position_world_m[2]
+        return Masks(
+            *with_surfaces(
+                frame, masks.detections, labels, furniture, floor_m, self._domain, self._config
+            )
+        )
+
     def _views(self, observation: Observation, masked: Sequence[Masks]) -> list[View]:
         """Every frame with names for what it shows; what one frame tells the next ones know."""
         kinds = {d.category for m in masked for d in m.detections if d.instance is None}
@@ -172,9 +196,6 @@ class GraphPerceiver:
                 remove(tracks, part, whole)
         return [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
 
-    def _is_fixture(self, category: str) -> bool:
-        return self._domain.is_a(category, self._domain.roles.fixture)
-
     def _view(
         self,
         frame: Frame,
@@ -190,9 +211,9 @@ class GraphPerceiver:
                 f"the state estimator {self._estimator.name!r} answered for {len(states)} of "
                 f"{len(detections)} detections"
             )
-        fixed = [self._is_fixture(d.category) for d in detections]
-        voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in fixed]
-        found = clouds(frame, labels, voxel_m, self._config, [not f for f in fixed])
+        stays = [fixed(self._domain, d.category) for d in detections]
+        voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in stays]
+        found = clouds(frame, labels, voxel_m, self._config, [not f for f in stays])
         if self._gate is not None:
             least = self._gate.least_score
             found = [

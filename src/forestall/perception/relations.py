@@ -12,13 +12,14 @@ from collections.abc import Collection
 import numpy as np
 
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.geometry import Stack
+from forestall.perception.geometry import Stack, sampled
 from forestall.perception.unproject import Points
 from forestall.types.graph import Relation
 from forestall.types.observation import Pose
 
 FRAME_NAME = "camera of the newest view, levelled"
 
+_FEW = 96
 _ALONG = (("right_of", "left_of"), ("behind", "in_front_of"), ("above", "below"))
 
 
@@ -72,7 +73,19 @@ def directions(
         for sign, predicate in zip((1, -1), _ALONG[axis], strict=True):
             hits = np.argwhere(close & applies & (sign * cosine[:, :, axis] > 0))
             found += [Relation(ids[i], predicate, ids[j]) for i, j in hits]
-    found += [
-        Relation(ids[i], "near", ids[j]) for i, j in np.argwhere(pair & (gap <= config.near_m))
-    ]
+    near = pair & (gap <= config.near_m)
+    for i, j in np.argwhere(np.triu(near & (gap <= 0.0))):
+        near[i, j] = near[j, i] = _beside(stack, int(i), int(j), config)
+    found += [Relation(ids[i], "near", ids[j]) for i, j in np.argwhere(near)]
     return found
+
+
+def _beside(stack: Stack, i: int, j: int, config: PerceptionConfig) -> bool:
+    """Whether things whose boxes overlap are near by their surfaces and the smaller one's length.
+
+    In a heap every box overlaps every other.
+    """
+    one, other = (sampled(stack.samples[k], _FEW) for k in (i, j))
+    size = min(float((stack.high_m[k] - stack.low_m[k]).max()) for k in (i, j))
+    apart = np.linalg.norm(one[:, None, :] - other[None, :, :], axis=2)
+    return float(apart.min()) <= min(config.near_m, max(0.75 * size, config.ring_m))

@@ -16,6 +16,7 @@ import numpy as np
 from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import DIRECTIONS, Stack
+from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.unproject import Points
 
 CONTAINMENT = "containment"
@@ -38,8 +39,7 @@ def parents(
     """
     found: dict[str, Parent] = {}
     for a, thing in enumerate(stack.things):
-        fixed = domain.is_a(thing.category, domain.roles.fixture)
-        if thing.id not in subjects or fixed:
+        if thing.id not in subjects or fixed(domain, thing.category):
             continue
         parent = _parent(stack, a, domain, config)
         if parent is not None:
@@ -84,15 +84,15 @@ def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> P
     holding: list[tuple[float, str, int]] = []
     touching: list[tuple[float, str, int]] = []
     for r in candidates:
-        predicate = domain.offers(stack.things[r].category) or ""
+        predicate = offered(domain, stack.things[r].category) or ""
         if domain.predicates[predicate].geometry == CONTAINMENT:
             if _inside(stack, a, r, share[r], bottom, domain, config):
                 holding.append((float(area[r]), predicate, r))
             continue
         contacts = _contacts(stack, a, r, bottom, config)
         needed = config.on_top_share
-        fixed = domain.is_a(stack.things[r].category, domain.roles.fixture)
-        if contacts >= config.plenty_contacts and not fixed:
+        stays = fixed(domain, stack.things[r].category)
+        if contacts >= config.plenty_contacts and not stays:
             needed = config.on_dish_share
         over_it = share[r] >= needed
         level = abs(float(stack.high_m[r, 2]) - bottom) <= config.contact_below_m
@@ -108,15 +108,28 @@ def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> P
     return predicate, stack.things[r].id
 
 
+def offered(domain: Domain, receptacle: str) -> str | None:
+    """The relation in which a receptacle takes things; None: it takes none.
+
+    A surface, and what the domain does not know, takes them on top.
+    """
+    if domain.find(receptacle) is not None:
+        return domain.offers(receptacle)
+    tops = (p for p in domain.containing if domain.predicates[p].geometry != CONTAINMENT)
+    return next(tops, None)
+
+
 def _takes(domain: Domain, receptacle: str, thing: str) -> bool:
     """Whether a thing can be in or on another, by rule; within walls only points count.
 
     A book in an oven is in it, whether or not it belongs there.
     """
-    offered = domain.offers(receptacle)
-    if domain.find(receptacle) is None or offered is None:
+    how = offered(domain, receptacle)
+    if how is None:
         return False
-    walls = domain.predicates[offered].geometry == CONTAINMENT
+    if domain.offers(receptacle) is None:
+        return receptacle == SURFACE
+    walls = domain.predicates[how].geometry == CONTAINMENT
     anything = domain.find(thing) is None or walls
     return anything or domain.accepts(receptacle, thing)
 

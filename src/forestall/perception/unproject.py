@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.perception.config import PerceptionConfig
-from forestall.types.observation import Detection, Frame, Intrinsics, Pose
+from forestall.types.observation import Depth, Detection, Frame, Intrinsics, Pose
 
 Points = npt.NDArray[np.float64]
 Labels = npt.NDArray[np.int16]
@@ -62,10 +62,30 @@ def _lattice(width: int, height: int) -> npt.NDArray[np.uint16]:
 
 
 @lru_cache(maxsize=4)
-def _rays(k: Intrinsics) -> npt.NDArray[np.float32]:
+def rays(k: Intrinsics) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """(W,) x of each column's and (H,) y of each row's rays at z = 1."""
+    x = (np.arange(k.width, dtype=np.float32) - np.float32(k.cx)) / np.float32(k.fx)
+    y = (np.arange(k.height, dtype=np.float32) - np.float32(k.cy)) / np.float32(k.fy)
+    return x, y
+
+
+def heights(
+    depth_m: Depth,
+    x: npt.NDArray[np.float32],
+    y: npt.NDArray[np.float32],
+    camera_to_world: Pose,
+) -> npt.NDArray[np.float32]:
+    """(h, w) height in the world of each pixel; x and y are those of its ray at z = 1."""
+    row = camera_to_world[2].astype(np.float32)
+    along = (x * row[0])[None, :] + (y * row[1] + row[2])[:, None]
+    found: npt.NDArray[np.float32] = depth_m * along + row[3]
+    return found
+
+
+@lru_cache(maxsize=4)
+def _each_ray(k: Intrinsics) -> npt.NDArray[np.float32]:
     """(H·W, 2) x and y of the ray through each pixel at z = 1."""
-    x = (np.arange(k.width, dtype=np.float32) - k.cx) / k.fx
-    y = (np.arange(k.height, dtype=np.float32) - k.cy) / k.fy
+    x, y = rays(k)
     return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1).reshape(-1, 2)
 
 
@@ -107,7 +127,7 @@ def clouds(
     pixels = np.bincount(flat + 1, minlength=count + 1)[1:]
     if count == 0:
         return []
-    low_bits = _low_bits(pixels, config)
+    low_bits = strides(pixels, config) - 1
     index, owner = _sampled_pixels(frame, flat, low_bits)
     points = _to_world(frame, index)
     worth = np.square(low_bits + 1, dtype=np.float64)
@@ -154,12 +174,12 @@ def robust_box(points_m: Points, share: float) -> tuple[Points, Points]:
     return ordered[cut], ordered[len(points_m) - 1 - cut]
 
 
-def _low_bits(pixels: npt.NDArray[np.int64], config: PerceptionConfig) -> npt.NDArray[np.int64]:
-    """For each mask, stride of its lattice minus one; strides are powers of two."""
+def strides(pixels: npt.NDArray[np.int64], config: PerceptionConfig) -> npt.NDArray[np.int64]:
+    """For each mask, the stride of the lattice on which it is unprojected, a power of two."""
     stride = np.sqrt(np.maximum(pixels / config.max_points, 1.0))
     wanted = np.left_shift(1, np.ceil(np.log2(stride)).astype(np.int64))
-    bits: npt.NDArray[np.int64] = np.minimum(wanted, config.max_stride) - 1
-    return bits
+    every: npt.NDArray[np.int64] = np.minimum(wanted, config.max_stride)
+    return every
 
 
 def _sampled_pixels(
@@ -176,7 +196,7 @@ def _sampled_pixels(
 
 
 def _to_world(frame: Frame, index: npt.NDArray[np.int64]) -> Points:
-    rays = _rays(frame.intrinsics)[index]
+    rays = _each_ray(frame.intrinsics)[index]
     depth = frame.depth_m.ravel()[index]
     local = np.empty((len(index), 3))
     local[:, :2] = rays * depth[:, None]
