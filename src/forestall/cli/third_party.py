@@ -1,0 +1,110 @@
+"""`forestall bench third-party`: the judges on a household that somebody else wrote."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+if TYPE_CHECKING:
+    from forestall.statistics.intervals import Metric
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Switch = Annotated[bool, Parameter(negative="")]
+
+
+def register(bench: App) -> None:
+    """Add the command to `forestall bench`."""
+    bench.command(third_party)
+
+
+def third_party(
+    household: str = "virtualhome",
+    *,
+    packages: Path | None = None,
+    development: Switch = False,
+    out: Path | None = None,
+    as_json: Json = False,
+    quiet: Switch = False,
+) -> int:
+    """False alarms on good runs, detection of failing ones, mined needs against true ones.
+
+    Every program is judged with demonstrations that it is not among, without a domain and with the
+    household's own. See docs/third-party.md.
+
+    Args:
+        household: whose programs.
+        packages: folder in which its packages were installed; where Python finds them by default.
+        development: judge the tasks on which things may be set, and not those that are reported.
+        out: a new JSON file for the results, what was said of every run included.
+        as_json: print JSON instead of the tables.
+        quiet: no progress on standard error.
+    """
+    from forestall.assembly.registry import foreign
+    from forestall.cli.progress import bar
+    from forestall.errors import InputError
+    from forestall.experiments.third_party import JUDGES, judge
+    from forestall.experiments.third_party_needs import ENOUGH, compare, table
+    from forestall.files import replace_file
+
+    if out is not None and out.exists():
+        raise InputError(f"{out} is there already: name a new file")
+    chosen = foreign(household)(packages=packages, development=development)
+    with bar("judging", quiet=quiet or as_json) as feed:
+        report = judge(chosen, feed)
+    runs = {r.name: r for g in chosen.good for r in (g, *chosen.demonstrations(g))}
+    needs = table(compare(chosen, list(runs.values())))
+    good, failing = report.counts()
+    data = {
+        "household": household,
+        "good": good,
+        "failing": failing,
+        "rows": [r.to_json() for r in report.rows()],
+        "needs": [r.to_json() for r in needs],
+        "changes": {k: report.by_change(k) for k in report.judged},
+    }
+    if out is not None:
+        said = {
+            k: [
+                {"run": j.run, "task": j.task, "change": j.change, "alarms": list(j.alarms)}
+                for j in several
+            ]
+            for k, several in report.judged.items()
+        }
+        replace_file(out, json.dumps({**data, "runs": said}, indent=1).encode())
+    if as_json:
+        print(json.dumps(data, indent=2))
+        return 0
+    from forestall.cli.listing import print_table
+
+    print(f"{household}: {good} good programs, {failing} failing runs")
+    print_table(
+        ("domain", "judge", "good runs alarmed", "detected in time", "at the step"),
+        [
+            (r.knowledge, r.judge, _share(r.false_alarms), _share(r.detected), _share(r.at))
+            for r in report.rows()
+        ],
+    )
+    for knowledge in report.judged:
+        print_table(
+            (f"detected, {knowledge}", "runs", *JUDGES),
+            [
+                (change, str(n), *(str(found[j]) for j in JUDGES))
+                for change, n, found in report.by_change(knowledge)
+            ],
+        )
+    print_table(
+        ("true by", f"from {ENOUGH} demonstrations", "precision", "recall", "skills"),
+        [(r.domain, r.what, _share(r.precision), _share(r.recall), str(r.skills)) for r in needs],
+    )
+    return 0
+
+
+def _share(metric: Metric) -> str:
+    """A share with its interval."""
+    if metric.value is None:
+        return "-"
+    band = "" if metric.low is None else f" ({100 * metric.low:.0f}-{100 * (metric.high or 0):.0f})"
+    return f"{100 * metric.value:.0f} %{band} of {metric.n}"

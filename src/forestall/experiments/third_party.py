@@ -1,0 +1,154 @@
+"""`forestall bench third-party`: the judges on a household that somebody else wrote.
+
+Called by the command line; calls the household (`seams.Foreign`), the parts of a run, and
+`third_party_rows`. Every run is judged by each judge alone with demonstrations that its own program
+is not among: up to a few of its task, or all that there are. Nothing stops at an alarm, so that all
+judges see the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from forestall.assembly.configuration import choices
+from forestall.assembly.monitor import DEFAULTS
+from forestall.assembly.parts import Assembly
+from forestall.comparison.needs import Needs
+from forestall.comparison.preconditions import needed
+from forestall.domain.model import Domain
+from forestall.errors import InputError
+from forestall.experiments.conduct import Progress
+from forestall.experiments.third_party_rows import NEEDS, PLAN, SCORE, Judged, Knowledge, Said
+from forestall.kinds import DETECTOR, RETRIEVER, VALIDATOR
+from forestall.learning.learn import learn
+from forestall.planning.validate import GraphValidator
+from forestall.seams import Foreign
+from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge
+from forestall.types.demonstration import Demonstration
+from forestall.types.facts import Literal
+from forestall.types.foreign import ForeignRun
+from forestall.types.graph import SceneGraph
+from forestall.types.runtime import BoundaryContext
+from forestall.types.scene import SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import Decision
+
+NO_DOMAIN = "none"
+ITS_TASK, ALL_TASKS = "its task", "all tasks"
+LEAST_WEIGHT = 0.75
+"""Of what is needed in a learnt domain: what a plan is checked by, as where needs are looked for
+ahead of a plan (`comparison.lacking`)."""
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Nobody is told how far it is."""
+
+
+def judge(foreign: Foreign, progress: Progress = _silent) -> list[Judged]:
+    """Judge every run, without a domain and with each of the household's.
+
+    Args:
+        foreign: the household.
+        progress: told how far it is.
+
+    Raises:
+        InputError: the household has no good run.
+    """
+    if not foreign.good:
+        raise InputError(f"{foreign.name} has no run that went well: there is nothing to judge")
+    made: dict[str, list[ForeignRun]] = {r.program: [r] for r in foreign.good}
+    for run in foreign.failing():
+        made[run.program].append(run)
+    every = {d.name: d for g in foreign.good for d in (g, *foreign.demonstrations(g))}
+    known: dict[str, Domain | None] = {NO_DOMAIN: None, **foreign.domains()}
+    total = len(known) * 2 * sum(map(len, made.values()))
+    judged: list[Judged] = []
+    for runs in made.values():
+        own = foreign.demonstrations(runs[0])
+        others = [d for d in every.values() if d.program != runs[0].program]
+        for memory, shown in ((ITS_TASK, own), (ALL_TASKS, others)):
+            for name, domain in known.items():
+                geometry = foreign.geometry if domain is None else ()
+                panel = _panel([without(r, geometry) for r in shown], domain, foreign.hands)
+                for run in runs:
+                    said = said_of(without(run, geometry), panel)
+                    judged.append(
+                        Judged(run.name, run.program, run.change, Knowledge(name, memory), said)
+                    )
+                progress(len(judged), total, runs[0].program)
+    return judged
+
+
+def _panel(
+    shown: Sequence[ForeignRun], domain: Domain | None, hands: Sequence[str]
+) -> dict[str, Judge]:
+    """The judges with some demonstrations; without a domain with the one that they show."""
+    memory = [r.demonstration() for r in shown]
+    own = learn(memory, hands=hands).domain if domain is None else domain
+    parts = Assembly(choices(DEFAULTS), own, memory, {"states": {}})
+    retriever = parts.part(RETRIEVER)
+    checked = parts.part(VALIDATOR) if domain else GraphValidator(weighed(own, memory))
+    return {
+        SCORE: DetectorJudge(parts.part(DETECTOR, "scene-graph"), retriever),
+        NEEDS: DetectorJudge(parts.part(DETECTOR, "preconditions"), retriever),
+        PLAN: PlanJudge(checked, PLAN),
+    }
+
+
+def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
+    """A learnt domain without the needs that are as likely habits.
+
+    Of what always held before a skill in its demonstrations only what weighs enough is left, since
+    a plan that is checked by habits is refused wherever somebody else has other ones.
+    """
+    counts = Needs.of(shown, domain)
+    heavy: dict[str, set[Literal]] = {name: set() for name in domain.skills}
+    for subtask in dict.fromkeys(s.subtask for d in shown for s in d.steps):
+        mined = needed(counts, subtask, None, None)
+        heavy[subtask.skill] |= {p.literal for p in mined if p.weight >= LEAST_WEIGHT}
+    return replace(
+        domain,
+        skills={
+            name: replace(skill, needs=tuple(n for n in skill.needs if n.formula in heavy[name]))
+            for name, skill in domain.skills.items()
+        },
+    )
+
+
+def without(run: ForeignRun, geometry: Sequence[str]) -> ForeignRun:
+    """A run whose scenes leave out some relations."""
+    if not geometry:
+        return run
+    scenes = tuple(_plain(g, geometry) for g in run.scenes)
+    final = None if run.final is None else _plain(run.final, geometry)
+    return replace(run, scenes=scenes, final=final)
+
+
+def _plain(graph: SceneGraph, geometry: Sequence[str]) -> SceneGraph:
+    kept = tuple(r for r in graph.relations if r.predicate not in geometry)
+    return replace(graph, relations=kept)
+
+
+def said_of(run: ForeignRun, panel: Mapping[str, Judge]) -> tuple[Mapping[str, Said], ...]:
+    """What each judge says before each step that the run came to."""
+    found = []
+    for context in _boundaries(run):
+        verdicts = {name: judge.judge(context) for name, judge in panel.items()}
+        found.append(
+            {
+                name: Said(v.score, v.decision is not Decision.PROCEED, v.note)
+                for name, v in verdicts.items()
+            }
+        )
+    return tuple(found)
+
+
+def _boundaries(run: ForeignRun) -> Iterator[BoundaryContext]:
+    task = Task(run.task, run.task, Goal(run.task), run.plan, SceneNeeds())
+    for index, scene in enumerate(run.scenes):
+        step = run.plan.subtasks[index]
+        scoped = replace(scene, subtask=step)
+        yield BoundaryContext(
+            task, run.plan, index, index, step, scene, scoped, None, looks=2, may_look=False
+        )
