@@ -8,7 +8,7 @@ judges see the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from forestall.assembly.configuration import choices
@@ -41,6 +41,9 @@ LEAST_WEIGHT = 0.75
 ahead of a plan (`comparison.lacking`)."""
 
 
+NOT_JUDGED = Said(None, False, "not judged")
+
+
 def _silent(done: int, total: int, what: str) -> None:
     """Nobody is told how far it is."""
 
@@ -70,9 +73,11 @@ def judge(foreign: Foreign, progress: Progress = _silent) -> list[Judged]:
         for memory, shown in ((ITS_TASK, own), (ALL_TASKS, others)):
             for name, domain in known.items():
                 geometry = foreign.geometry if domain is None else ()
-                panel = _panel([without(r, geometry) for r in shown], domain, foreign.hands)
+                seen = [without(r, geometry).demonstration() for r in shown]
+                own_domain = domain or learn(seen, hands=foreign.hands).domain
+                panel = _panel(seen, own_domain, learnt=domain is None)
                 for run in runs:
-                    said = said_of(without(run, geometry), panel)
+                    said = said_of(without(run, geometry), panel, own_domain.skills)
                     judged.append(
                         Judged(run.name, run.program, run.change, Knowledge(name, memory), said)
                     )
@@ -80,15 +85,11 @@ def judge(foreign: Foreign, progress: Progress = _silent) -> list[Judged]:
     return judged
 
 
-def _panel(
-    shown: Sequence[ForeignRun], domain: Domain | None, hands: Sequence[str]
-) -> dict[str, Judge]:
-    """The judges with some demonstrations; without a domain with the one that they show."""
-    memory = [r.demonstration() for r in shown]
-    own = learn(memory, hands=hands).domain if domain is None else domain
-    parts = Assembly(choices(DEFAULTS), own, memory, {"states": {}})
+def _panel(memory: Sequence[Demonstration], domain: Domain, learnt: bool) -> dict[str, Judge]:
+    """The judges with some demonstrations and the domain that is known, or that they show."""
+    parts = Assembly(choices(DEFAULTS), domain, memory, {"states": {}})
     retriever = parts.part(RETRIEVER)
-    checked = parts.part(VALIDATOR) if domain else GraphValidator(weighed(own, memory))
+    checked = GraphValidator(weighed(domain, memory)) if learnt else parts.part(VALIDATOR)
     return {
         SCORE: DetectorJudge(parts.part(DETECTOR, "scene-graph"), retriever),
         NEEDS: DetectorJudge(parts.part(DETECTOR, "preconditions"), retriever),
@@ -130,10 +131,22 @@ def _plain(graph: SceneGraph, geometry: Sequence[str]) -> SceneGraph:
     return replace(graph, relations=kept)
 
 
-def said_of(run: ForeignRun, panel: Mapping[str, Judge]) -> tuple[Mapping[str, Said], ...]:
-    """What each judge says before each step that the run came to."""
+def said_of(
+    run: ForeignRun, panel: Mapping[str, Judge], skills: Collection[str]
+) -> tuple[Mapping[str, Said], ...]:
+    """What each judge says before each step that the run came to.
+
+    Args:
+        run: good or failing.
+        panel: the judges.
+        skills: those of the judges' domain. What nobody has shown is not judged, neither as the
+            next step nor as a later one.
+    """
     found = []
-    for context in _boundaries(run):
+    for context in _boundaries(run, skills):
+        if context.subtask.skill not in skills:
+            found.append(dict.fromkeys(panel, NOT_JUDGED))
+            continue
         verdicts = {name: judge.judge(context) for name, judge in panel.items()}
         found.append(
             {
@@ -144,11 +157,14 @@ def said_of(run: ForeignRun, panel: Mapping[str, Judge]) -> tuple[Mapping[str, S
     return tuple(found)
 
 
-def _boundaries(run: ForeignRun) -> Iterator[BoundaryContext]:
-    task = Task(run.task, run.task, Goal(run.task), run.plan, SceneNeeds())
+def _boundaries(run: ForeignRun, skills: Collection[str]) -> Iterator[BoundaryContext]:
+    steps = run.plan.subtasks
     for index, scene in enumerate(run.scenes):
-        step = run.plan.subtasks[index]
+        step = steps[index]
+        unknown = (i for i in range(index + 1, len(steps)) if steps[i].skill not in skills)
+        plan = replace(run.plan, subtasks=steps[: next(unknown, len(steps))])
+        task = Task(run.task, run.task, Goal(run.task), plan, SceneNeeds())
         scoped = replace(scene, subtask=step)
         yield BoundaryContext(
-            task, run.plan, index, index, step, scene, scoped, None, looks=2, may_look=False
+            task, plan, index, index, step, scene, scoped, None, looks=2, may_look=False
         )

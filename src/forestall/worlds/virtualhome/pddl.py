@@ -26,6 +26,14 @@ _HELD_BY = {"holds_rh": "right_gripper", "holds_lh": "left_gripper"}
 _UNARY = re.compile(r"\b(\w+)\((\?\w+)\)")
 _HOLDS = re.compile(r"\b(holds_[rl]h)\(\?\w+, (\?\w+)\)")
 
+_SHUT_IN = re.compile(
+    r"not \(some (\?\w+): obj_inside\((\?\w+), \1\) and opening\(\1\)=closed\)"
+)
+_HANDS_FULL = re.compile(
+    r"not \(\(some (\?\w+): held_by\(\1, \w+\)\) and \(some (\?\w+): held_by\(\2, \w+\)\)\)"
+)
+_LITERAL = re.compile(r"\w+\([?\w, ]*\)(?:=\w+)?")
+
 _VALUES = {v: a for a, values in ATTRIBUTES.items() for v in values}
 
 
@@ -69,6 +77,8 @@ def corrected(pddl: Path, kinds: Kinds) -> Domain:
     """
     tables = _tables(pddl, kinds)
     own = _shipped("corrections.toml")
+    for skill in own["skills"].values():
+        skill["needs"] = [_need(n["fact"]) for n in skill["needs"]]
     tables["skills"] |= own["skills"]
     tables["categories"] = own["categories"] | tables["categories"]
     return build_domain(tables)
@@ -121,15 +131,20 @@ def _categories(kinds: Kinds, tags: list[str]) -> dict[str, Any]:
 def _skill(skill: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "parameters": skill["parameters"],
-        "needs": [{"fact": _asked(n["fact"])} for n in skill.get("needs", ())],
+        "needs": [_need(_asked(n["fact"])) for n in skill.get("needs", ())],
         "effects": [e for one in skill.get("effects", ()) for e in _happens(one)],
     }
 
 
+def _need(fact: str) -> dict[str, Any]:
+    """A need; a single fact that fails is what is lacking."""
+    return {"fact": fact, "lacks": [fact]} if _LITERAL.fullmatch(fact) else {"fact": fact}
+
+
 def _asked(formula: str) -> str:
     """A condition in our words."""
-    formula = _HOLDS.sub(_held, formula)
-    return _UNARY.sub(_stated, formula)
+    formula = _UNARY.sub(_stated, _HOLDS.sub(_held, formula))
+    return _HANDS_FULL.sub("hand_free()", _SHUT_IN.sub(r"accessible(\2)", formula))
 
 
 def _held(match: re.Match[str]) -> str:

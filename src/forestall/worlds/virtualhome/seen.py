@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from forestall.types.graph import ObjectNode, Relation, SceneGraph
+from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.worlds.virtualhome.evolving import Evolving
 
 HANDS = {"right_gripper": "HOLDS_RH", "left_gripper": "HOLDS_LH"}
@@ -29,6 +29,8 @@ ATTRIBUTES: dict[str, dict[str, str]] = {
 HAVING = {"opening": "CAN_OPEN", "power": "HAS_SWITCH", "mains": "HAS_PLUG"}
 """Attribute → the property of things that have it, whether or not a state is known."""
 
+_HALF_M = 0.1
+
 POSTURES = {"sitting": "SITTING", "lying": "LYING"}
 
 
@@ -46,9 +48,16 @@ def scene(flat: Evolving, about: Iterable[int]) -> SceneGraph:
     """
     ids = _concerned(flat, about)
     names = {i: name_of(flat.name(i), i) for i in ids}
-    nodes = [ObjectNode(names[i], flat.name(i), _states(flat, i)) for i in sorted(ids)]
+    nodes = [_node(flat, i, names[i]) for i in sorted(ids)]
     nodes += [ObjectNode(h, h) for h in HANDS]
     return SceneGraph(tuple(nodes), tuple(_relations(flat, ids, names)))
+
+
+def _node(flat: Evolving, node: int, name: str) -> ObjectNode:
+    """A thing; its box is made up, and says only that its place is known."""
+    x, h = float(node), _HALF_M
+    box = Box((x - h, -h, 0.0), (x + h, h, 2 * h))
+    return ObjectNode(name, flat.name(node), _states(flat, node), box.centre, box)
 
 
 def _concerned(flat: Evolving, about: Iterable[int]) -> set[int]:
