@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 if TYPE_CHECKING:
+    from forestall.experiments.third_party_rows import Judged
     from forestall.statistics.intervals import Metric
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
@@ -43,63 +44,75 @@ def third_party(
         quiet: no progress on standard error.
     """
     from forestall.assembly.registry import foreign
+    from forestall.cli.listing import print_table
     from forestall.cli.progress import bar
     from forestall.errors import InputError
-    from forestall.experiments.third_party import JUDGES, judge
+    from forestall.experiments.third_party import judge
     from forestall.experiments.third_party_needs import ENOUGH, compare, table
+    from forestall.experiments.third_party_rows import JUDGES, changes, rows
     from forestall.files import replace_file
 
     if out is not None and out.exists():
         raise InputError(f"{out} is there already: name a new file")
     chosen = foreign(household)(packages=packages, development=development)
     with bar("judging", quiet=quiet or as_json) as feed:
-        report = judge(chosen, feed)
+        judged = judge(chosen, feed)
     runs = {r.name: r for g in chosen.good for r in (g, *chosen.demonstrations(g))}
-    needs = table(compare(chosen, list(runs.values())))
-    good, failing = report.counts()
+    needs, found = table(compare(chosen, list(runs.values()))), rows(judged)
+    first = [j for j in judged if j.knowledge == judged[0].knowledge]
+    good = sum(not j.change for j in first)
     data = {
         "household": household,
         "good": good,
-        "failing": failing,
-        "rows": [r.to_json() for r in report.rows()],
+        "failing": len(first) - good,
+        "rows": [r.to_json() for r in found],
         "needs": [r.to_json() for r in needs],
-        "changes": {k: report.by_change(k) for k in report.judged},
     }
     if out is not None:
-        said = {
-            k: [
-                {"run": j.run, "task": j.task, "change": j.change, "alarms": list(j.alarms)}
-                for j in several
-            ]
-            for k, several in report.judged.items()
-        }
-        replace_file(out, json.dumps({**data, "runs": said}, indent=1).encode())
+        replace_file(out, json.dumps({**data, "runs": [_run(j) for j in judged]}).encode())
     if as_json:
         print(json.dumps(data, indent=2))
         return 0
-    from forestall.cli.listing import print_table
-
-    print(f"{household}: {good} good programs, {failing} failing runs")
+    print(f"{household}: {good} good programs, {len(first) - good} failing runs")
     print_table(
-        ("domain", "judge", "good runs alarmed", "detected in time", "at the step"),
+        ("domain", "memory", "judge", "good runs alarmed", "detected in time", "at the step"),
         [
-            (r.knowledge, r.judge, _share(r.false_alarms), _share(r.detected), _share(r.at))
-            for r in report.rows()
+            (
+                r.knowledge.domain,
+                r.knowledge.memory,
+                r.judge,
+                *map(_share, (r.false_alarms, r.detected, r.at)),
+            )
+            for r in found
         ],
     )
-    for knowledge in report.judged:
+    for knowledge in dict.fromkeys(j.knowledge for j in judged):
+        print(f"detected by change, domain {knowledge.domain}, memory {knowledge.memory}")
         print_table(
-            (f"detected, {knowledge}", "runs", *JUDGES),
-            [
-                (change, str(n), *(str(found[j]) for j in JUDGES))
-                for change, n, found in report.by_change(knowledge)
-            ],
+            ("change", "runs", *JUDGES),
+            [(change, str(n), *map(str, by)) for change, n, by in changes(judged, knowledge)],
         )
     print_table(
         ("true by", f"from {ENOUGH} demonstrations", "precision", "recall", "skills"),
         [(r.domain, r.what, _share(r.precision), _share(r.recall), str(r.skills)) for r in needs],
     )
     return 0
+
+
+def _run(judged: Judged) -> dict[str, object]:
+    """Everything that was said of a run."""
+    said = [
+        {name: [one.score, one.alarm, one.note] for name, one in boundary.items()}
+        for boundary in judged.said
+    ]
+    return {
+        "run": judged.run,
+        "program": judged.program,
+        "change": judged.change,
+        "domain": judged.knowledge.domain,
+        "memory": judged.knowledge.memory,
+        "said": said,
+    }
 
 
 def _share(metric: Metric) -> str:
