@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from stranger import GRASP, INSERT, UNSCREW, scene
 
 from forestall.assembly import registry
 from forestall.cli.main import call
@@ -19,6 +18,7 @@ from forestall.experiments.third_party_rows import NEEDS, PLAN, Judged, Knowledg
 from forestall.types.foreign import ForeignRun
 from forestall.types.plan import Plan
 from forestall.types.symbolic import scene_graph
+from stranger import GRASP, INSERT, UNSCREW, scene
 
 DOMAIN = """
 name = "pegs"
@@ -110,7 +110,7 @@ class Pegs:
 
 @pytest.fixture(scope="module")
 def judged() -> list[Judged]:
-    return judge(Pegs())
+    return judge(Pegs(), pooled=True)
 
 
 def test_every_run_is_judged_with_every_knowledge(judged: list[Judged]) -> None:
@@ -172,7 +172,7 @@ def test_the_command_prints_and_writes(
     printed = capsys.readouterr().out
     assert "pegs: 12 good programs, 2 failing runs" in printed and "dirty hole" in printed
     data: dict[str, Any] = json.loads(out.read_text())
-    assert len(data["runs"]) == 56 and data["rows"][0]["false_alarms"]["n"] == 12
+    assert len(data["runs"]) == 28 and data["rows"][0]["false_alarms"]["n"] == 12
     assert call(["bench", "third-party", "pegs", "--quiet", "--out", str(out)]) == 2
     with pytest.raises(UnknownNameError, match="unknown household 'nobody'"):
         registry.foreign("nobody")

@@ -26,6 +26,7 @@ def third_party(
     *,
     packages: Path | None = None,
     development: Switch = False,
+    pooled: Switch = False,
     out: Path | None = None,
     as_json: Json = False,
     quiet: Switch = False,
@@ -39,6 +40,7 @@ def third_party(
         household: whose programs.
         packages: folder in which its packages were installed; where Python finds them by default.
         development: judge the tasks on which things may be set, and not those that are reported.
+        pooled: judge also with the demonstrations of all tasks, which takes ten times as long.
         out: a new JSON file for the results, what was said of every run included.
         as_json: print JSON instead of the tables.
         quiet: no progress on standard error.
@@ -56,7 +58,7 @@ def third_party(
         raise InputError(f"{out} is there already: name a new file")
     chosen = foreign(household)(packages=packages, development=development)
     with bar("judging", quiet=quiet or as_json) as feed:
-        judged = judge(chosen, feed)
+        judged = judge(chosen, feed, pooled=pooled)
     runs = {r.name: r for g in chosen.good for r in (g, *chosen.demonstrations(g))}
     needs, found = table(compare(chosen, list(runs.values()))), rows(judged)
     first = [j for j in judged if j.knowledge == judged[0].knowledge]

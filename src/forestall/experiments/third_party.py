@@ -14,7 +14,7 @@ from dataclasses import replace
 from forestall.assembly.configuration import choices
 from forestall.assembly.monitor import DEFAULTS
 from forestall.assembly.parts import Assembly
-from forestall.comparison.needs import Needs
+from forestall.comparison.needs import needs_of
 from forestall.comparison.preconditions import needed
 from forestall.domain.model import Domain
 from forestall.errors import InputError
@@ -48,29 +48,36 @@ def _silent(done: int, total: int, what: str) -> None:
     """Nobody is told how far it is."""
 
 
-def judge(foreign: Foreign, progress: Progress = _silent) -> list[Judged]:
+def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = False) -> list[Judged]:
     """Judge every run, without a domain and with each of the household's.
 
     Args:
-        foreign: the household.
+        foreign: the household. Programs that are the only one of their task are left out.
+        pooled: also with the demonstrations of all tasks, which takes ten times as long.
         progress: told how far it is.
 
     Raises:
         InputError: the household has no good run.
     """
-    if not foreign.good:
-        raise InputError(f"{foreign.name} has no run that went well: there is nothing to judge")
-    made: dict[str, list[ForeignRun]] = {r.program: [r] for r in foreign.good}
+    made = {r.program: [r] for r in foreign.good if foreign.demonstrations(r)}
+    if not made:
+        raise InputError(
+            f"{foreign.name} has no run that went well with another of its task to compare it "
+            "with: there is nothing to judge"
+        )
     for run in foreign.failing():
-        made[run.program].append(run)
+        if run.program in made:
+            made[run.program].append(run)
     every = {d.name: d for g in foreign.good for d in (g, *foreign.demonstrations(g))}
     known: dict[str, Domain | None] = {NO_DOMAIN: None, **foreign.domains()}
-    total = len(known) * 2 * sum(map(len, made.values()))
+    total = len(known) * (1 + pooled) * sum(map(len, made.values()))
     judged: list[Judged] = []
     for runs in made.values():
-        own = foreign.demonstrations(runs[0])
-        others = [d for d in every.values() if d.program != runs[0].program]
-        for memory, shown in ((ITS_TASK, own), (ALL_TASKS, others)):
+        memories = {ITS_TASK: foreign.demonstrations(runs[0])}
+        if pooled:
+            own = runs[0].program
+            memories[ALL_TASKS] = tuple(d for d in every.values() if d.program != own)
+        for memory, shown in memories.items():
             for name, domain in known.items():
                 geometry = foreign.geometry if domain is None else ()
                 seen = [without(r, geometry).demonstration() for r in shown]
@@ -103,9 +110,14 @@ def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
     Of what always held before a skill in its demonstrations only what weighs enough is left, since
     a plan that is checked by habits is refused wherever somebody else has other ones.
     """
-    counts = Needs.of(shown, domain)
+    counts = needs_of(shown, domain)
     heavy: dict[str, set[Literal]] = {name: set() for name in domain.skills}
-    for subtask in dict.fromkeys(s.subtask for d in shown for s in d.steps):
+    alike = {
+        (s.subtask.skill, *counts.kinds(s.subtask).values()): s.subtask
+        for d in shown
+        for s in d.steps
+    }
+    for subtask in alike.values():
         mined = needed(counts, subtask, None, None)
         heavy[subtask.skill] |= {p.literal for p in mined if p.weight >= LEAST_WEIGHT}
     return replace(
@@ -159,12 +171,13 @@ def said_of(
 
 def _boundaries(run: ForeignRun, skills: Collection[str]) -> Iterator[BoundaryContext]:
     steps = run.plan.subtasks
-    for index, scene in enumerate(run.scenes):
-        step = steps[index]
-        unknown = (i for i in range(index + 1, len(steps)) if steps[i].skill not in skills)
-        plan = replace(run.plan, subtasks=steps[: next(unknown, len(steps))])
+    unknown = [i for i, step in enumerate(steps) if step.skill not in skills]
+    for at, scene in enumerate(run.scenes):
+        first = max((i + 1 for i in unknown if i < at), default=0)
+        last = min((i for i in unknown if i > at), default=len(steps))
+        plan = replace(run.plan, subtasks=steps[first:last])
         task = Task(run.task, run.task, Goal(run.task), plan, SceneNeeds())
-        scoped = replace(scene, subtask=step)
+        scoped = replace(scene, subtask=steps[at])
         yield BoundaryContext(
-            task, plan, index, index, step, scene, scoped, None, looks=2, may_look=False
+            task, plan, at - first, at, steps[at], scene, scoped, None, looks=2, may_look=False
         )

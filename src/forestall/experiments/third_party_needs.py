@@ -196,7 +196,7 @@ def _one(
 
 
 def _says(mined: Fact, true: Fact, domain: Domain) -> bool:
-    """Whether a fact is another, or says of an attribute what leaves out the value that must not be."""
+    """Whether a fact is another, or gives an attribute another value than it must not have."""
     if mined == true:
         return True
     name, places, value = true

@@ -1,4 +1,4 @@
-"""Runs of a household that somebody else wrote: programs, what was seen before each step, how it ended.
+"""Runs of a household that somebody else wrote: what was seen before each step, how it ended.
 
 Made by a plug-in that reads them (`seams.Foreign`), judged by an experiment.
 """

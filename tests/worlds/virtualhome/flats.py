@@ -4,14 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-
 ME, KITCHEN, FRIDGE, PLATE, LAMP, CUP = 1, 2, 3, 4, 5, 6
 GROUP = "dataset/programs_processed_precond_nograb_morepreconds"
 SCENE = "TrimmedTestScene1_graph/results"
 
 
-
-def node(number: int, name: str, *properties: str, states: tuple[str, ...] = (), category: str = ""):  # type: ignore[no-untyped-def]
+def node(
+    number: int, name: str, *properties: str, states: tuple[str, ...] = (), category: str = ""
+) -> dict[str, Any]:
     return {
         "id": number,
         "class_name": name,
@@ -70,7 +70,8 @@ PDDL = """(define (domain tiny)
     (surfaces ?obj - object) (person ?obj - object)
     (holds_rh ?char - character ?obj - object) (holds_lh ?char - character ?obj - object)
     (next_to ?char - character ?obj - object) (on_char ?obj - object ?char - character)
-    (obj_next_to ?obj1 ?obj2 - object) (obj_inside ?obj1 ?obj2 - object) (obj_ontop ?obj1 ?obj2 - object))
+    (obj_next_to ?obj1 ?obj2 - object) (obj_inside ?obj1 ?obj2 - object)
+    (obj_ontop ?obj1 ?obj2 - object))
   (:action walk_towards :parameters (?char - character ?obj - object)
     :precondition (not (sitting ?char))
     :effect (and (next_to ?char ?obj)

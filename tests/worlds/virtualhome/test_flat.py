@@ -87,9 +87,7 @@ def test_what_the_evolving_graph_cannot_do_is_a_refusal(
         assert said in str(flat.act(line))
 
 
-def test_the_flat_conforms(
-    packages: Packages, fetch: tuple[Program, Flat], domain: Domain
-) -> None:
+def test_the_flat_conforms(packages: Packages, fetch: tuple[Program, Flat], domain: Domain) -> None:
     program, start = fetch
     steps = carried_out(packages, program, start).plan.subtasks
     make = lambda: FlatWorld(packages.evolving_graph, start, program.ids)  # noqa: E731

@@ -4,12 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-
-from forestall.errors import FileFormatError, InputError
-from forestall.types.plan import Subtask
-from forestall.worlds.virtualhome.changes import changes
-from forestall.worlds.virtualhome.packages import Line, Packages, Program, read_program, read_start
-from forestall.worlds.virtualhome.plans import plan
 from flats import (
     CUP,
     FETCH,
@@ -21,6 +15,12 @@ from flats import (
     graph,
     installed,
 )
+
+from forestall.errors import FileFormatError, InputError
+from forestall.types.plan import Subtask
+from forestall.worlds.virtualhome.changes import changes
+from forestall.worlds.virtualhome.packages import Line, Packages, Program, read_program, read_start
+from forestall.worlds.virtualhome.plans import plan
 
 
 def test_programs_are_read_with_their_task_and_steps(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from flats import FETCH, installed
 
 from forestall.domain.model import Domain
 from forestall.domain.truth import truth
@@ -13,7 +14,6 @@ from forestall.types.symbolic import scene_graph
 from forestall.types.task import Goal
 from forestall.worlds.virtualhome.packages import Packages, read_start
 from forestall.worlds.virtualhome.pddl import Kinds, as_published
-from flats import FETCH, installed
 
 HANDS = {"left_gripper": {}, "right_gripper": {}}
 

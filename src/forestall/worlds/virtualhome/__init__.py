@@ -1,1 +1,1 @@
-"""VirtualHome's household: its published programs and its evolving graph, for who has the packages."""
+"""VirtualHome: its published programs and its evolving graph, for who has the packages."""

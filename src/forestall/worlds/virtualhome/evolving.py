@@ -123,7 +123,12 @@ def _loaded(folder: str) -> tuple[ModuleType, ...]:
 
 
 def _joined(
-    self: Any, script: Any, state: Any, info: Any, who: int, modify: bool = True,
+    self: Any,
+    script: Any,
+    state: Any,
+    info: Any,
+    who: int,
+    modify: bool = True,
     in_place: bool = False,
 ) -> Iterator[Any]:
     """`JoinedExecutor.execute`, which in 2.3.0 takes fewer arguments than it is given."""

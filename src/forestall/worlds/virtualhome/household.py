@@ -3,7 +3,8 @@
 Called by `bench third-party` through the registry; calls the importer and `changes`. Good are
 programs that the executor carries out, of the reported tasks up to four each; demonstrations are up
 to eleven others of the task. Failing are those in which one change makes the executor refuse a
-step, of each program the first such change of each sort. All other tasks are for whoever sets something: nothing of what is reported was tuned on.
+step, of each program the first such change of each sort. All other tasks are for whoever sets
+something: nothing of what is reported was tuned on.
 """
 
 from __future__ import annotations

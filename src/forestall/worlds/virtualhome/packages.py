@@ -19,9 +19,7 @@ from forestall.reading.documents import read_json
 from forestall.reading.fields import Field
 from forestall.reading.files import read_text
 
-HOW = (
-    "pip install --no-deps --target FOLDER eai-eval==1.0.5 virtualhome==2.3.0 and give the folder"
-)
+HOW = "pip install --no-deps --target FOLDER eai-eval==1.0.5 virtualhome==2.3.0 and give the folder"
 _DATA, _ENGINE = "virtualhome_eval", "virtualhome"
 _SET = "dataset/programs_processed_precond_nograb_morepreconds"
 _PDDL = "resources/virtualhome/virtualhome.pddl"

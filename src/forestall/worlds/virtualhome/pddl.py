@@ -26,9 +26,7 @@ _HELD_BY = {"holds_rh": "right_gripper", "holds_lh": "left_gripper"}
 _UNARY = re.compile(r"\b(\w+)\((\?\w+)\)")
 _HOLDS = re.compile(r"\b(holds_[rl]h)\(\?\w+, (\?\w+)\)")
 
-_SHUT_IN = re.compile(
-    r"not \(some (\?\w+): obj_inside\((\?\w+), \1\) and opening\(\1\)=closed\)"
-)
+_SHUT_IN = re.compile(r"not \(some (\?\w+): obj_inside\((\?\w+), \1\) and opening\(\1\)=closed\)")
 _HANDS_FULL = re.compile(
     r"not \(\(some (\?\w+): held_by\(\1, \w+\)\) and \(some (\?\w+): held_by\(\2, \w+\)\)\)"
 )
@@ -39,7 +37,7 @@ _VALUES = {v: a for a, values in ATTRIBUTES.items() for v in values}
 
 @dataclass
 class Kinds:
-    """What the things of start graphs are: class name → properties, and attributes that they have."""
+    """What the things of start graphs are: class name → properties, and attributes."""
 
     properties: dict[str, set[str]] = field(default_factory=dict)
     attributes: dict[str, set[str]] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""The flat as a world that a robot acts in (implements `Environment`): no pictures, whole truth seen.
+"""The flat as a world that a robot acts in (implements `Environment`); all of it is seen.
 
 Called by whoever has the packages and a start graph; calls the evolving graph, which refuses what
 cannot be done and says why. Skills are those of the household's domain, their first argument is who
