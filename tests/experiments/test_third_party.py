@@ -92,7 +92,7 @@ def run(number: int, change: str = "") -> ForeignRun:
 
 class Pegs:
     name = "pegs"
-    hands = ("gripper",)
+    hands: tuple[str, ...] = ("gripper",)
     geometry: tuple[str, ...] = ()
 
     def __init__(self, packages: Path | None = None, development: bool = False) -> None:
@@ -148,7 +148,8 @@ def test_needs_and_effects_are_compared_with_the_true_ones() -> None:
     pegs = Pegs()
     found = {r.what: r for r in table(compare(pegs, pegs.good))}
     assert found[LEARNT].recall.value == 1.0
-    assert found[LEARNT].precision.value is not None and found[LEARNT].precision.value < 1.0
+    precision = found[LEARNT].precision.value
+    assert precision is not None and precision < 1.0
     assert found[EFFECTS].recall.value == 1.0 and found[EFFECTS].skills == 3
 
 

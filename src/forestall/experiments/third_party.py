@@ -84,7 +84,9 @@ def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = Fals
                 own_domain = domain or learn(seen, hands=foreign.hands).domain
                 panel = _panel(seen, own_domain, learnt=domain is None)
                 for run in runs:
-                    said = said_of(without(run, geometry), panel, own_domain.skills)
+                    said = said_of(
+                        without(run, geometry), panel, own_domain.skills, domain is not None
+                    )
                     judged.append(
                         Judged(run.name, run.program, run.change, Knowledge(name, memory), said)
                     )
@@ -105,10 +107,11 @@ def _panel(memory: Sequence[Demonstration], domain: Domain, learnt: bool) -> dic
 
 
 def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
-    """A learnt domain without the needs that are as likely habits.
+    """A learnt domain without what is as likely a habit.
 
-    Of what always held before a skill in its demonstrations only what weighs enough is left, since
-    a plan that is checked by habits is refused wherever somebody else has other ones.
+    Of what always held before a skill in its demonstrations what weighs enough is left: a plan that
+    is checked by habits is refused wherever somebody else has other ones. Left out are the kinds of
+    things that a skill was shown with, and that nothing is related to a thing, but for a free hand.
     """
     counts = needs_of(shown, domain)
     heavy: dict[str, set[Literal]] = {name: set() for name in domain.skills}
@@ -119,14 +122,24 @@ def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
     }
     for subtask in alike.values():
         mined = needed(counts, subtask, None, None)
-        heavy[subtask.skill] |= {p.literal for p in mined if p.weight >= LEAST_WEIGHT}
-    return replace(
-        domain,
-        skills={
-            name: replace(skill, needs=tuple(n for n in skill.needs if n.formula in heavy[name]))
-            for name, skill in domain.skills.items()
-        },
-    )
+        heavy[subtask.skill] |= {
+            p.literal
+            for p in mined
+            if p.weight >= LEAST_WEIGHT
+            and (
+                p.literal.predicate not in domain.derived
+                or p.literal.predicate == domain.roles.hand_empty
+            )
+        }
+    skills = {
+        name: replace(
+            skill,
+            parameters=tuple(replace(p, kind=None) for p in skill.parameters),
+            needs=tuple(n for n in skill.needs if n.formula in heavy[name]),
+        )
+        for name, skill in domain.skills.items()
+    }
+    return replace(domain, skills=skills)
 
 
 def without(run: ForeignRun, geometry: Sequence[str]) -> ForeignRun:
@@ -144,7 +157,7 @@ def _plain(graph: SceneGraph, geometry: Sequence[str]) -> SceneGraph:
 
 
 def said_of(
-    run: ForeignRun, panel: Mapping[str, Judge], skills: Collection[str]
+    run: ForeignRun, panel: Mapping[str, Judge], skills: Collection[str], ahead: bool
 ) -> tuple[Mapping[str, Said], ...]:
     """What each judge says before each step that the run came to.
 
@@ -153,9 +166,10 @@ def said_of(
         panel: the judges.
         skills: those of the judges' domain. What nobody has shown is not judged, neither as the
             next step nor as a later one.
+        ahead: whether the judges see the rest of the plan, or its next step alone.
     """
     found = []
-    for context in _boundaries(run, skills):
+    for context in _boundaries(run, skills, ahead):
         if context.subtask.skill not in skills:
             found.append(dict.fromkeys(panel, NOT_JUDGED))
             continue
@@ -169,12 +183,12 @@ def said_of(
     return tuple(found)
 
 
-def _boundaries(run: ForeignRun, skills: Collection[str]) -> Iterator[BoundaryContext]:
+def _boundaries(run: ForeignRun, skills: Collection[str], ahead: bool) -> Iterator[BoundaryContext]:
     steps = run.plan.subtasks
     unknown = [i for i, step in enumerate(steps) if step.skill not in skills]
     for at, scene in enumerate(run.scenes):
         first = max((i + 1 for i in unknown if i < at), default=0)
-        last = min((i for i in unknown if i > at), default=len(steps))
+        last = min((i for i in unknown if i > at), default=len(steps)) if ahead else at + 1
         plan = replace(run.plan, subtasks=steps[first:last])
         task = Task(run.task, run.task, Goal(run.task), plan, SceneNeeds())
         scoped = replace(scene, subtask=steps[at])

@@ -9,13 +9,14 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import truth
 from forestall.planning.validate import GraphValidator
 from forestall.types.facts import Literal, Truth
+from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.symbolic import scene_graph
 from forestall.types.task import Goal
 from forestall.worlds.virtualhome.packages import Packages, read_start
 from forestall.worlds.virtualhome.pddl import Kinds, as_published
 
-HANDS = {"left_gripper": {}, "right_gripper": {}}
+HANDS: dict[str, dict[str, str]] = {"left_gripper": {}, "right_gripper": {}}
 
 
 @pytest.fixture
@@ -26,12 +27,12 @@ def domain(tmp_path: Path) -> Domain:
     return as_published(packages.pddl, kinds)
 
 
-def scene(*relations: str, opening: str = "closed", power: str = "neither", sitting: str = "no"):  # type: ignore[no-untyped-def]
+def scene(*relations: str, opening: str = "closed") -> SceneGraph:
     return scene_graph(
         {
             "objects": {
-                "character-1": {"sitting": sitting, "lying": "no"},
-                "fridge-3": {"opening": opening, "power": power, "dirt": "clean"},
+                "character-1": {"sitting": "no", "lying": "no"},
+                "fridge-3": {"opening": opening, "power": "neither", "dirt": "clean"},
                 "plate-4": {"dirt": "dirty"},
                 "cup-6": {"dirt": "clean"},
                 **HANDS,

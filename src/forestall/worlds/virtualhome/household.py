@@ -43,7 +43,7 @@ class Household:
     """
 
     name = "virtualhome"
-    hands = tuple(HANDS)
+    hands: tuple[str, ...] = tuple(HANDS)
     geometry: tuple[str, ...] = ("obj_next_to",)
 
     def __init__(
@@ -99,7 +99,7 @@ class Household:
 
     def demonstrations(self, run: ForeignRun) -> tuple[ForeignRun, ...]:
         """Other programs of the run's task that the executor carries out."""
-        found = []
+        found: list[ForeignRun] = []
         for program in self._programs[run.task]:
             if len(found) == OTHERS:
                 break

@@ -249,11 +249,14 @@ _EDGE = {"from_id": int, "relation_type": str, "to_id": int}
 
 
 def _edges(field: Field) -> frozenset[tuple[int, str, int]]:
-    """Thousands in a graph: looked at one by one only where one is not as it should be."""
-    found = field.value if isinstance(field.value, list) else field.items()
-    for number, edge in enumerate(found):
+    """The edges, thousands in a graph: without a `Field` for each."""
+    if not isinstance(field.value, list):
+        field.fail("a list")
+    found: list[tuple[int, str, int]] = []
+    for number, edge in enumerate(field.value):
         if not isinstance(edge, dict) or any(type(edge.get(k)) is not t for k, t in _EDGE.items()):
             raise FileFormatError(
                 f"{field.place}[{number}]: an edge has {', '.join(_EDGE)}, not {edge!r}"
             )
-    return frozenset((e["from_id"], e["relation_type"], e["to_id"]) for e in found)
+        found.append((edge["from_id"], edge["relation_type"], edge["to_id"]))
+    return frozenset(found)

@@ -25,7 +25,7 @@ LOOK_S = 1.0
 HOLDS = "the character was told to hold"
 
 VERBS: Mapping[str, str] = {
-    **{skill: verb for verb, skill in reversed(SKILLS.items())},
+    **{skill: verb for verb, skill in reversed(list(SKILLS.items()))},
     "walk_towards": "WALK",
     "walk_into": "WALK",
 }
