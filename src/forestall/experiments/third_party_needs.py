@@ -138,7 +138,8 @@ def _mined(
     places = {p.name: i for i, p in enumerate(schema.parameters)}
     literals = [n.formula for n in schema.needs if isinstance(n.formula, Literal)]
     weighed: set[Literal] = set()
-    for subtask in {s.subtask for d in shown for s in d.steps if s.subtask.skill == skill}:
+    uses = [s.subtask for d in shown for s in d.steps if s.subtask.skill == skill]
+    for subtask in {tuple(counts.kinds(u).values()): u for u in uses}.values():
         weighed |= {p.literal for p in needed(counts, subtask, None, None)}
     effects = [f for e in schema.effects for f in e.facts]
     return {
