@@ -6,7 +6,7 @@ the strategy, the strategy calls detector, reasoner, replanner; all see only thi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -26,6 +26,7 @@ from forestall.types.episode import (
 )
 from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
+from forestall.types.foreign import ForeignRun
 from forestall.types.graph import SceneGraph
 from forestall.types.kind import Kind
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
@@ -173,6 +174,29 @@ class Eye(Protocol):
 
     def around(self, environment: Environment) -> Environment:
         """The same world, seen through it."""
+
+
+class Foreign(Protocol):
+    """A household that somebody else wrote, with runs of it; its options are its own."""
+
+    name: str
+    hands: tuple[str, ...]
+    """Node ids of the hands in its scenes."""
+    geometry: tuple[str, ...]
+    """Relations that only say where things happen to be: left out where there is no domain."""
+
+    @property
+    def good(self) -> Sequence[ForeignRun]:
+        """Runs that went well, to be judged."""
+
+    def failing(self) -> Iterator[ForeignRun]:
+        """Runs made from them by one change each, in which a step is refused."""
+
+    def demonstrations(self, run: ForeignRun) -> Sequence[ForeignRun]:
+        """What a run made of this program is compared with: others of its task."""
+
+    def domains(self) -> Mapping[str, Domain]:
+        """Its domain, in one or several versions, each by what it is called in tables."""
 
 
 class Parts(Protocol):

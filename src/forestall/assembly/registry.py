@@ -173,6 +173,13 @@ TABLES: Mapping[str, Table] = {
 }
 
 
+FOREIGN: Mapping[str, str] = {
+    "virtualhome": "forestall.worlds.virtualhome.household:Household",
+}
+"""Households that somebody else wrote (`seams.Foreign`): no part of a run. Others add theirs by
+entry point, group "forestall.third-party"."""
+
+
 @dataclass(frozen=True, slots=True)
 class Found:
     """A factory and where it comes from.
@@ -245,6 +252,23 @@ def find(kind: str, name: str) -> Found:
             f"{kind} {name!r} of the package {package} cannot be loaded ({target}): "
             f"{type(error).__name__}: {error}"
         ) from error
+
+
+def foreign(name: str) -> Callable[..., Any]:
+    """What makes a household of others, by its name.
+
+    Raises:
+        UnknownNameError: no such household.
+        InputError: it is known and cannot be imported.
+    """
+    others = {e.name: e.value for e in _entries("third-party")}
+    target = FOREIGN.get(name, others.get(name))
+    if target is None:
+        raise UnknownNameError("household", name, (*FOREIGN, *others))
+    try:
+        return _imported(target)
+    except ImportError as error:
+        raise InputError(f"household {name!r} cannot be loaded ({target}): {error}") from error
 
 
 def _entries(kind: str) -> tuple[EntryPoint, ...]:

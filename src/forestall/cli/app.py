@@ -8,7 +8,7 @@ import cyclopts
 from cyclopts import App
 
 import forestall
-from forestall.cli import experiments
+from forestall.cli import experiments, third_party
 from forestall.cli.bench import bench
 from forestall.cli.calibrate import calibrate
 from forestall.cli.cases import cases
@@ -39,6 +39,7 @@ app.command(domain)
 app.command(bench)
 app.command(cases)
 experiments.register(bench)
+third_party.register(bench)
 app.command(encoder)
 app.command(plan)
 app.command(preconditions)

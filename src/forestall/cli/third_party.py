@@ -1,0 +1,125 @@
+"""`forestall bench third-party`: the judges on a household that somebody else wrote."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+if TYPE_CHECKING:
+    from forestall.experiments.third_party_rows import Judged
+    from forestall.statistics.intervals import Metric
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Switch = Annotated[bool, Parameter(negative="")]
+
+
+def register(bench: App) -> None:
+    """Add the command to `forestall bench`."""
+    bench.command(third_party)
+
+
+def third_party(
+    household: str = "virtualhome",
+    *,
+    packages: Path | None = None,
+    development: Switch = False,
+    pooled: Switch = False,
+    out: Path | None = None,
+    as_json: Json = False,
+    quiet: Switch = False,
+) -> int:
+    """False alarms on good runs, detection of failing ones, mined needs against true ones.
+
+    Every program is judged with demonstrations that it is not among, without a domain and with the
+    household's own. See docs/third-party.md.
+
+    Args:
+        household: whose programs.
+        packages: folder in which its packages were installed; where Python finds them by default.
+        development: judge the tasks on which things may be set, and not those that are reported.
+        pooled: judge also with the demonstrations of all tasks, which takes ten times as long.
+        out: a new JSON file for the results, what was said of every run included.
+        as_json: print JSON instead of the tables.
+        quiet: no progress on standard error.
+    """
+    from forestall.assembly.registry import foreign
+    from forestall.cli.listing import print_table
+    from forestall.cli.progress import bar
+    from forestall.errors import InputError
+    from forestall.experiments.third_party import judge
+    from forestall.experiments.third_party_needs import ENOUGH, compare, table
+    from forestall.experiments.third_party_rows import JUDGES, changes, rows
+    from forestall.files import replace_file
+
+    if out is not None and out.exists():
+        raise InputError(f"{out} is there already: name a new file")
+    chosen = foreign(household)(packages=packages, development=development)
+    with bar("judging", quiet=quiet or as_json) as feed:
+        judged = judge(chosen, feed, pooled=pooled)
+    runs = {r.name: r for g in chosen.good for r in (g, *chosen.demonstrations(g))}
+    needs, found = table(compare(chosen, list(runs.values()))), rows(judged)
+    first = [j for j in judged if j.knowledge == judged[0].knowledge]
+    good = sum(not j.change for j in first)
+    data = {
+        "household": household,
+        "good": good,
+        "failing": len(first) - good,
+        "rows": [r.to_json() for r in found],
+        "needs": [r.to_json() for r in needs],
+    }
+    if out is not None:
+        replace_file(out, json.dumps({**data, "runs": [_run(j) for j in judged]}).encode())
+    if as_json:
+        print(json.dumps(data, indent=2))
+        return 0
+    print(f"{household}: {good} good programs, {len(first) - good} failing runs")
+    print_table(
+        ("domain", "memory", "judge", "good runs alarmed", "detected in time", "at the step"),
+        [
+            (
+                r.knowledge.domain,
+                r.knowledge.memory,
+                r.judge,
+                *map(_share, (r.false_alarms, r.detected, r.at)),
+            )
+            for r in found
+        ],
+    )
+    for knowledge in dict.fromkeys(j.knowledge for j in judged):
+        print(f"detected by change, domain {knowledge.domain}, memory {knowledge.memory}")
+        print_table(
+            ("change", "runs", *JUDGES),
+            [(change, str(n), *map(str, by)) for change, n, by in changes(judged, knowledge)],
+        )
+    print_table(
+        ("true by", f"from {ENOUGH} demonstrations", "precision", "recall", "skills"),
+        [(r.domain, r.what, _share(r.precision), _share(r.recall), str(r.skills)) for r in needs],
+    )
+    return 0
+
+
+def _run(judged: Judged) -> dict[str, object]:
+    """Everything that was said of a run."""
+    said = [
+        {name: [one.score, one.alarm, one.note] for name, one in boundary.items()}
+        for boundary in judged.said
+    ]
+    return {
+        "run": judged.run,
+        "program": judged.program,
+        "change": judged.change,
+        "domain": judged.knowledge.domain,
+        "memory": judged.knowledge.memory,
+        "said": said,
+    }
+
+
+def _share(metric: Metric) -> str:
+    """A share with its interval."""
+    if metric.value is None:
+        return "-"
+    band = "" if metric.low is None else f" ({100 * metric.low:.0f}-{100 * (metric.high or 0):.0f})"
+    return f"{100 * metric.value:.0f} %{band} of {metric.n}"

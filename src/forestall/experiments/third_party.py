@@ -1,0 +1,197 @@
+"""`forestall bench third-party`: the judges on a household that somebody else wrote.
+
+Called by the command line; calls the household (`seams.Foreign`), the parts of a run, and
+`third_party_rows`. Every run is judged by each judge alone with demonstrations that its own program
+is not among: up to a few of its task, or all that there are. Nothing stops at an alarm, so that all
+judges see the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from forestall.assembly.configuration import choices
+from forestall.assembly.monitor import DEFAULTS
+from forestall.assembly.parts import Assembly
+from forestall.comparison.needs import needs_of
+from forestall.comparison.preconditions import needed
+from forestall.domain.model import Domain
+from forestall.errors import InputError
+from forestall.experiments.conduct import Progress
+from forestall.experiments.third_party_rows import NEEDS, PLAN, SCORE, Judged, Knowledge, Said
+from forestall.kinds import DETECTOR, RETRIEVER, VALIDATOR
+from forestall.learning.learn import learn
+from forestall.planning.validate import GraphValidator
+from forestall.seams import Foreign
+from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge
+from forestall.types.demonstration import Demonstration
+from forestall.types.facts import Literal
+from forestall.types.foreign import ForeignRun
+from forestall.types.graph import SceneGraph
+from forestall.types.runtime import BoundaryContext
+from forestall.types.scene import SceneNeeds
+from forestall.types.task import Goal, Task
+from forestall.types.verdict import Decision
+
+NO_DOMAIN = "none"
+ITS_TASK, ALL_TASKS = "its task", "all tasks"
+LEAST_WEIGHT = 0.75
+"""Of what is needed in a learnt domain: what a plan is checked by, as where needs are looked for
+ahead of a plan (`comparison.lacking`)."""
+
+
+NOT_JUDGED = Said(None, False, "not judged")
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Nobody is told how far it is."""
+
+
+def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = False) -> list[Judged]:
+    """Judge every run, without a domain and with each of the household's.
+
+    Args:
+        foreign: the household. Programs that are the only one of their task are left out.
+        pooled: also with the demonstrations of all tasks, which takes ten times as long.
+        progress: told how far it is.
+
+    Raises:
+        InputError: the household has no good run.
+    """
+    made = {r.program: [r] for r in foreign.good if foreign.demonstrations(r)}
+    if not made:
+        raise InputError(
+            f"{foreign.name} has no run that went well with another of its task to compare it "
+            "with: there is nothing to judge"
+        )
+    for run in foreign.failing():
+        if run.program in made:
+            made[run.program].append(run)
+    every = {d.name: d for g in foreign.good for d in (g, *foreign.demonstrations(g))}
+    known: dict[str, Domain | None] = {NO_DOMAIN: None, **foreign.domains()}
+    total = len(known) * (1 + pooled) * sum(map(len, made.values()))
+    judged: list[Judged] = []
+    for runs in made.values():
+        memories = {ITS_TASK: foreign.demonstrations(runs[0])}
+        if pooled:
+            own = runs[0].program
+            memories[ALL_TASKS] = tuple(d for d in every.values() if d.program != own)
+        for memory, shown in memories.items():
+            for name, domain in known.items():
+                geometry = foreign.geometry if domain is None else ()
+                seen = [without(r, geometry).demonstration() for r in shown]
+                own_domain = domain or learn(seen, hands=foreign.hands).domain
+                panel = _panel(seen, own_domain, learnt=domain is None)
+                for run in runs:
+                    said = said_of(
+                        without(run, geometry), panel, own_domain.skills, domain is not None
+                    )
+                    judged.append(
+                        Judged(run.name, run.program, run.change, Knowledge(name, memory), said)
+                    )
+                progress(len(judged), total, runs[0].program)
+    return judged
+
+
+def _panel(memory: Sequence[Demonstration], domain: Domain, learnt: bool) -> dict[str, Judge]:
+    """The judges with some demonstrations and the domain that is known, or that they show."""
+    parts = Assembly(choices(DEFAULTS), domain, memory, {"states": {}})
+    retriever = parts.part(RETRIEVER)
+    checked = GraphValidator(weighed(domain, memory)) if learnt else parts.part(VALIDATOR)
+    return {
+        SCORE: DetectorJudge(parts.part(DETECTOR, "scene-graph"), retriever),
+        NEEDS: DetectorJudge(parts.part(DETECTOR, "preconditions"), retriever),
+        PLAN: PlanJudge(checked, PLAN),
+    }
+
+
+def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
+    """A learnt domain without what is as likely a habit.
+
+    Of what always held before a skill in its demonstrations what weighs enough is left: a plan that
+    is checked by habits is refused wherever somebody else has other ones. Left out are the kinds of
+    things that a skill was shown with, and that nothing is related to a thing, but for a free hand.
+    """
+    counts = needs_of(shown, domain)
+    heavy: dict[str, set[Literal]] = {name: set() for name in domain.skills}
+    alike = {
+        (s.subtask.skill, *counts.kinds(s.subtask).values()): s.subtask
+        for d in shown
+        for s in d.steps
+    }
+    for subtask in alike.values():
+        mined = needed(counts, subtask, None, None)
+        heavy[subtask.skill] |= {
+            p.literal
+            for p in mined
+            if p.weight >= LEAST_WEIGHT
+            and (
+                p.literal.predicate not in domain.derived
+                or p.literal.predicate == domain.roles.hand_empty
+            )
+        }
+    skills = {
+        name: replace(
+            skill,
+            parameters=tuple(replace(p, kind=None) for p in skill.parameters),
+            needs=tuple(n for n in skill.needs if n.formula in heavy[name]),
+        )
+        for name, skill in domain.skills.items()
+    }
+    return replace(domain, skills=skills)
+
+
+def without(run: ForeignRun, geometry: Sequence[str]) -> ForeignRun:
+    """A run whose scenes leave out some relations."""
+    if not geometry:
+        return run
+    scenes = tuple(_plain(g, geometry) for g in run.scenes)
+    final = None if run.final is None else _plain(run.final, geometry)
+    return replace(run, scenes=scenes, final=final)
+
+
+def _plain(graph: SceneGraph, geometry: Sequence[str]) -> SceneGraph:
+    kept = tuple(r for r in graph.relations if r.predicate not in geometry)
+    return replace(graph, relations=kept)
+
+
+def said_of(
+    run: ForeignRun, panel: Mapping[str, Judge], skills: Collection[str], ahead: bool
+) -> tuple[Mapping[str, Said], ...]:
+    """What each judge says before each step that the run came to.
+
+    Args:
+        run: good or failing.
+        panel: the judges.
+        skills: those of the judges' domain. What nobody has shown is not judged, neither as the
+            next step nor as a later one.
+        ahead: whether the judges see the rest of the plan, or its next step alone.
+    """
+    found = []
+    for context in _boundaries(run, skills, ahead):
+        if context.subtask.skill not in skills:
+            found.append(dict.fromkeys(panel, NOT_JUDGED))
+            continue
+        verdicts = {name: judge.judge(context) for name, judge in panel.items()}
+        found.append(
+            {
+                name: Said(v.score, v.decision is not Decision.PROCEED, v.note)
+                for name, v in verdicts.items()
+            }
+        )
+    return tuple(found)
+
+
+def _boundaries(run: ForeignRun, skills: Collection[str], ahead: bool) -> Iterator[BoundaryContext]:
+    steps = run.plan.subtasks
+    unknown = [i for i, step in enumerate(steps) if step.skill not in skills]
+    for at, scene in enumerate(run.scenes):
+        first = max((i + 1 for i in unknown if i < at), default=0)
+        last = min((i for i in unknown if i > at), default=len(steps)) if ahead else at + 1
+        plan = replace(run.plan, subtasks=steps[first:last])
+        task = Task(run.task, run.task, Goal(run.task), plan, SceneNeeds())
+        scoped = replace(scene, subtask=steps[at])
+        yield BoundaryContext(
+            task, plan, at - first, at, steps[at], scene, scoped, None, looks=2, may_look=False
+        )

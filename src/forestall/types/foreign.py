@@ -1,0 +1,50 @@
+"""Runs of a household that somebody else wrote: what was seen before each step, how it ended.
+
+Made by a plug-in that reads them (`seams.Foreign`), judged by an experiment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.graph import SceneGraph
+from forestall.types.plan import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignRun:
+    """One run.
+
+    Args:
+        name: of its own.
+        program: which program it is, or was made of.
+        task: what the program is for.
+        plan: its steps.
+        scenes: what was seen before each step, as far as the run came.
+        final: what was seen after the last one, None where a step was refused.
+        change: which sort of change makes it fail, "" for a good one.
+        why: why the last step was refused, in the words of who executed it.
+    """
+
+    name: str
+    program: str
+    task: str
+    plan: Plan
+    scenes: tuple[SceneGraph, ...]
+    final: SceneGraph | None = None
+    change: str = ""
+    why: str = ""
+
+    @property
+    def fails(self) -> int | None:
+        """Index of the step that was refused, None for a run that went well."""
+        return None if self.final is not None else len(self.scenes) - 1
+
+    def demonstration(self) -> Demonstration:
+        """The run as a demonstration, every graph whole."""
+        steps = tuple(
+            DemonstrationStep(i, s, replace(g, subtask=s), replace(g, subtask=s))
+            for i, (s, g) in enumerate(zip(self.plan, self.scenes, strict=True))
+        )
+        return Demonstration(self.task, self.program, 0, steps, id=self.name, final=self.final)
