@@ -148,6 +148,8 @@ class PreconditionDetector:
             knowledge = None
         if subtask is None or (knowledge is None and not references):
             return self._verdict(Decision.PROCEED, None, references, NO_REFERENCE)
+        if not scenes(references) and not all(observed.matches(a) for a in subtask.args):
+            return self._verdict(Decision.PROCEED, None, references, NO_REFERENCE)
         if knowledge is None or context is None:
             mined = self._preconditions(references, subtask)
             found = [

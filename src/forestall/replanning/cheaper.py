@@ -40,6 +40,8 @@ class Asked:
         check: a plan → the answer with it, None where it will not do.
         steps_to: a state and facts → steps to them, none where they are not found.
         start: where the robot stands, x and y in metres.
+        keeps_rest: whether the old plan's steps stand as they are, because there is no goal that
+            says what they are for.
     """
 
     state: State
@@ -47,6 +49,7 @@ class Asked:
     check: Callable[[Steps], Replan | None]
     steps_to: Callable[[State, Sequence[Literal]], Steps]
     start: Spot | None
+    keeps_rest: bool = False
 
 
 def cheaper(asked: Asked, found: Replan, rest: int) -> Replan:
@@ -64,6 +67,8 @@ def cheaper(asked: Asked, found: Replan, rest: int) -> Replan:
 
     def accepts(other: Steps, own: int) -> bool:
         nonlocal best, shortest, mine
+        if asked.keeps_rest and other[len(other) - rest :] != steps[len(steps) - rest :]:
+            return False
         if not restored <= _restored(asked, other, own):
             return False
         accepted = asked.check(other)

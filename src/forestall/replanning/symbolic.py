@@ -306,6 +306,7 @@ class PlannerReplanner:
             lambda steps: self._checked(attempts, context, state, steps),
             lambda start, facts: self._to(attempts, start, facts).subtasks,
             _stands_at(context),
+            keeps_rest=not context.task.goal.literals,
         )
         return cheaper(asked, found, rest)
 
