@@ -89,7 +89,8 @@ def test_a_quick_experiment_is_a_balanced_tenth() -> None:
     honest = {r.case for r in usual if r.profile == "honest"}
     long = {"long", "long-undisturbed"}
     assert {c.twin for c in honest if c.set not in long} <= honest
-    assert len({(c.task, c.seed) for c in honest if c.set != "undisturbed"}) > 50, "many rooms"
+    disturbed = {c for c in honest if c.set != "undisturbed"}
+    assert len({(c.task, c.seed) for c in disturbed}) > len(disturbed) / 2, "many rooms"
 
 
 def test_what_is_not_possible_is_said_with_what_is() -> None:

@@ -32,7 +32,7 @@ def _few_draws(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def made(out: Path, workers: int) -> None:
     engine = "inline" if workers == 1 else "local"
     experiment = Experiment(
-        Choice("all", "development", limit=4, profiles=("kind",)), workers, engine
+        Choice("all", "development", limit=4, profiles=("kind",), part=1.0), workers, engine
     )
     conduct(experiment, out, lambda *a: None, computed_row, lambda *a: None)
 
