@@ -200,7 +200,7 @@ class Monitor:
             told = replace(outcome, reason="")  # it may name what the robot has not seen
             if outcome.status is not SkillStatus.REFUSED:
                 try:
-                    self._parts.acted(run.last.subtask)
+                    self._parts.acted(run.last.subtask, outcome.status is SkillStatus.SUCCEEDED)
                 except PartError as error:
                     return self._moments.hold_for(error, run.last.subtask)
             if (held := self._moments.too_many(run, run.last.subtask)) is not None:

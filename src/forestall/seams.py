@@ -301,8 +301,8 @@ class StateEstimator(Protocol):
 class Perceiver(Protocol):
     """Turns observations into one scene graph that lives over the episode.
 
-    One with a method `acted(subtask)` is told each skill that was carried out, whether it is said
-    to have succeeded or not, so that it can doubt what that may have changed.
+    One with a method `acted(subtask, succeeded)` is told each skill that was carried out and
+    whether it is said to have succeeded, so that it can doubt what that may have changed.
     """
 
     def reset(self) -> None:

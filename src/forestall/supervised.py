@@ -155,15 +155,15 @@ class SupervisedParts:
             "perceiver", lambda: perceive(observation), "perceive", gives=SceneGraph
         )
 
-    def acted(self, subtask: Subtask) -> None:
-        """A skill was carried out.
+    def acted(self, subtask: Subtask, succeeded: bool) -> None:
+        """A skill was carried out, and the robot says whether it succeeded.
 
         Raises:
             PartError: the perceiver failed or was late.
         """
         told = getattr(self._perceiver, "acted", None)
         if told is not None:
-            self._calls.call("perceiver", lambda: told(subtask), "perceive")
+            self._calls.call("perceiver", lambda: told(subtask, succeeded), "perceive")
 
     @property
     def domain(self) -> Domain:

@@ -1,14 +1,20 @@
 """What a skill may have changed, and nothing else."""
 
+from dataclasses import replace
+
 from forestall.planning.altered import altered
-from forestall.types.plan import Subtask
+from forestall.planning.validate import GraphValidator
+from forestall.types.facts import Literal
+from forestall.types.plan import Plan, Subtask
+from forestall.types.task import Goal
 from planning.corpus import DOMAIN, scene
 
 SINK = "Mug-1 in Sink-1, Faucet-1, Cup-1 on CounterTop-1, CounterTop-1, Fridge-1"
 
 
 def after(step: str, *more: str) -> set[tuple[str, str]]:
-    return set(altered(scene(SINK, *more), Subtask.parse(step), DOMAIN))
+    found = altered(scene(SINK, *more), Subtask.parse(step), DOMAIN)
+    return {(c.thing, c.attribute) for c in found}
 
 
 def test_a_tap_fills_what_stands_below_it() -> None:
@@ -30,3 +36,18 @@ def test_the_scene_is_left_as_it_was() -> None:
     graph = scene(SINK)
     altered(graph, Subtask.parse("toggle_on(Faucet-1)"), DOMAIN)
     assert graph == scene(SINK)
+
+
+def test_what_nobody_has_read_since_is_assumed_to_be_what_it_was_meant_to_become() -> None:
+    graph = scene("Mug-1 on CounterTop-1, CounterTop-1, Sink-1, Faucet-1")
+    was = graph.get("Mug-1")
+    assert was is not None
+    unread = tuple((a, None if a == "filled" else v) for a, v in was.states)
+    plan = Plan((Subtask.parse("pick_up(Mug-1)"),))
+    goal = Goal("a mug of water", literals=(Literal("filled", ("Mug-1",), "water"),))
+    for presumed, ok in (((), False), ((("filled", "water"),), True)):
+        mug = replace(was, states=unread, presumed=presumed)
+        nodes = tuple(mug if n.id == mug.id else n for n in graph.nodes)
+        check = GraphValidator(DOMAIN).check(plan, replace(graph, nodes=nodes), goal)
+        assert check.ok is ok
+        assert "filled" in {x.predicate for x in check.assumed}, "assumed, and said to be"

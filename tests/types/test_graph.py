@@ -39,6 +39,14 @@ def test_json_round_trip_is_the_identity() -> None:
     assert graph.to_networkx().number_of_edges() == 2
 
 
+def test_what_is_presumed_survives_json_and_is_not_a_state() -> None:
+    plain = kitchen()
+    bowl = replace(plain.nodes[0], presumed=(("filled", "water"),))
+    graph = replace(plain, nodes=(bowl, *plain.nodes[1:]))
+    assert graph != plain and bowl.state("filled") is None
+    assert SceneGraph.from_json(json.loads(json.dumps(graph.to_json()))) == graph
+
+
 def test_image_features_survive_json_where_there_are_any() -> None:
     plain = kitchen()
     assert all("feature" not in n for n in plain.to_json()["nodes"])

@@ -37,7 +37,7 @@ from forestall.perception.tracks import (
     vec,
 )
 from forestall.perception.unproject import Points, robust_box
-from forestall.types.facts import Truth, category_of
+from forestall.types.facts import Change, Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
 
@@ -61,11 +61,16 @@ class SceneMemory:
         self._relations: list[Relation] = []
         self.forgotten: tuple[str, ...] = ()  # in the newest observation, for want of room
 
-    def doubt(self, states: Iterable[tuple[str, str]]) -> None:
-        """Forget what was read of some (thing, attribute), until it is read again."""
-        for name, attribute in states:
+    def doubt(self, changes: Iterable[Change], succeeded: bool) -> None:
+        """Forget what was read of some states, until they are read again.
+
+        Until then they are presumed to be what they were meant to become, or what they were before
+        if what should have changed them is said to have failed.
+        """
+        for name, attribute, before, after in changes:
             if name in self.tracks:
                 self.tracks[name].states.pop(attribute, None)
+                self.tracks[name].presumed[attribute] = after if succeeded else before
 
     # --- integration ----------------------------------------------------------------------------
 
@@ -374,6 +379,7 @@ class SceneMemory:
             pixels=track.pixels,
             last_seen_s=track.last_seen_s,
             feature=track.feature,
+            presumed=tuple((a, v) for a, v in track.presumed.items() if states.get(a, v) is None),
         )
 
     # --- small questions ------------------------------------------------------------------------

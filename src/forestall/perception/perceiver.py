@@ -31,7 +31,7 @@ from forestall.perception.unproject import (
     label_image,
 )
 from forestall.seams import ImageEncoder, Segmenter, StateEstimator
-from forestall.types.facts import category_of
+from forestall.types.facts import Change, category_of
 from forestall.types.feature import quantised
 from forestall.types.finding import Finding, refuse
 from forestall.types.graph import SceneGraph
@@ -40,8 +40,8 @@ from forestall.types.plan import Subtask
 
 _GATE = GateConfig()
 
-Alters = Callable[[SceneGraph, Subtask], Iterable[tuple[str, str]]]
-"""What is believed, what was carried out → (thing, attribute) that it may have changed."""
+Alters = Callable[[SceneGraph, Subtask], Iterable[Change]]
+"""What is believed, what was carried out → what that may have changed."""
 
 
 class GraphPerceiver:
@@ -120,10 +120,15 @@ class GraphPerceiver:
             self.findings += (Finding("forgotten", f"no room to remember {names}", refuses=False),)
         return self._memory.graph()
 
-    def acted(self, subtask: Subtask) -> None:
-        """A skill was carried out: what it may have changed is not known until it is read again."""
+    def acted(self, subtask: Subtask, succeeded: bool) -> None:
+        """A skill was carried out: what it may have changed is not known until it is read again.
+
+        Args:
+            subtask: in the names of the graph.
+            succeeded: whether the robot believes that it has done it.
+        """
         if self._alters is not None:
-            self._memory.doubt(self._alters(self._memory.graph(), subtask))
+            self._memory.doubt(self._alters(self._memory.graph(), subtask), succeeded)
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
         """The part of a graph that concerns a (grounded) subtask, with its subtask node."""

@@ -24,7 +24,8 @@ class Track:
     """One object as believed now; `points_world_m` is None when its place is not known.
 
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
-    view that showed it showed it where it was before, `vague` that it was seen and never located.
+    view that showed it showed it where it was before, `vague` that it was seen and never located,
+    `presumed` what skills should have made of states since they were read.
     """
 
     id: str
@@ -38,6 +39,7 @@ class Track:
     first_seen_s: float = 0.0
     last_seen_s: float = 0.0
     states: dict[str, str | None] = field(default_factory=dict)
+    presumed: dict[str, str] = field(default_factory=dict)
     feature: bytes | None = None
     parent: Parent | None = None
     interior_seen: bool = False

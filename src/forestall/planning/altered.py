@@ -8,18 +8,20 @@ from __future__ import annotations
 from forestall.domain.model import Domain
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.validate import observed
+from forestall.types.facts import Change
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
 
-def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[tuple[str, str], ...]:
+def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[Change, ...]:
     """States that are others after a skill, as far as the model knows what is seen.
 
-    What it would bring about is not said: it may have failed, or the model may be wrong. A skill
-    that the domain lacks, or that could not run from what is seen, changes nothing that is known.
+    What it changes them to is what it is meant to: it may have failed, or the model may be wrong.
+    A skill that the domain lacks, or that could not run from what is seen, changes nothing that is
+    known.
 
     Returns:
-        (thing, attribute) in order; processes that the skill sets off are among what changes.
+        In order; processes that the skill sets off are among what changes.
     """
     if subtask.skill not in domain.skills:
         return ()
@@ -28,8 +30,10 @@ def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[tuple[
     if isinstance(after, Refusal):
         return ()
     return tuple(
-        (node.id, attribute)
+        Change(node.id, attribute, old, new)
         for node in graph.nodes
         for attribute, _ in node.states
-        if before.value(node.id, attribute) != after.value(node.id, attribute)
+        if (old := before.value(node.id, attribute)) is not None
+        and (new := after.value(node.id, attribute)) is not None
+        and old != new
     )

@@ -78,8 +78,9 @@ class State:
     def from_graph(cls, graph: SceneGraph, domain: Domain) -> State:
         """Read a scene graph; what is of a category that the domain lacks is a thing, no more.
 
-        An unobserved attribute takes its default and is listed in `assumed`, as is the emptiness
-        of every hidden container. A thing with neither box nor place is lost.
+        An unobserved attribute takes what is presumed of it, else its default, and is listed in
+        `assumed`, as is the emptiness of every hidden container. A thing with neither box nor place
+        is lost.
         """
         hands = domain.robot.hands
         domain = domain.knowing(n.category for n in graph.nodes if n.id not in hands)
@@ -92,11 +93,13 @@ class State:
                 continue
             category = domain[node.category]
             state.kinds[node.id] = category.name
+            presumed = dict(node.presumed)
             for attribute, default in domain.default_states(category.name).items():
                 value = node.state(attribute)
                 if value is None:
-                    assumed.add(Literal(attribute, (node.id,), default))
-                state.values[node.id, attribute] = default if value is None else value
+                    value = presumed.get(attribute, default)
+                    assumed.add(Literal(attribute, (node.id,), value))
+                state.values[node.id, attribute] = value
             loose = node.box_m is None and node.id not in placed
             if loose and roles.fixture not in category.tags:
                 lost.add(node.id)

@@ -13,11 +13,21 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from forestall.errors import InputError
 
 GRIPPER = "gripper"
 """Node id of the hand of a robot that has one; a domain may name other hands."""
+
+
+class Change(NamedTuple):
+    """A state of a thing that something may have changed: from a value to another."""
+
+    thing: str
+    attribute: str
+    before: str
+    after: str
 
 
 class Truth(Enum):

@@ -74,7 +74,9 @@ class ObjectNode:
     `centroid_m` and `box_m` are None when the object was never located. `pixels` counts the mask
     pixels of the newest view that saw it. `feature` is what an image encoder made of its largest
     crop in the newest observation that saw it, as `types/feature.py` quantises it; which encoder
-    stands in the record of the perception.
+    stands in the record of the perception. `presumed` is what the skills that were carried out
+    should have made of states that nobody has read since: plans take it as an assumption, nothing
+    else does.
     """
 
     id: str
@@ -86,9 +88,11 @@ class ObjectNode:
     pixels: int = 0
     last_seen_s: float = 0.0
     feature: bytes | None = field(default=None, repr=False)
+    presumed: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", tuple(sorted(self.states)))
+        object.__setattr__(self, "presumed", tuple(sorted(self.presumed)))
         if self.feature is not None and not any(self.feature):
             raise InputError(f"the image feature of {self.id} is empty or all zero")
 
@@ -281,6 +285,8 @@ def _node_json(node: ObjectNode, features: bool) -> dict[str, Any]:
     }
     if features and node.feature is not None:
         data["feature"] = base64.b64encode(node.feature).decode("ascii")
+    if node.presumed:
+        data["presumed"] = dict(node.presumed)
     return data
 
 
@@ -301,6 +307,7 @@ def node_from(field: Field) -> ObjectNode:
         pixels=pixels or 0,
         last_seen_s=0.0 if seen_s is None else seen_s.number(),
         feature=field.optional("feature", _feature),
+        presumed=field.optional("presumed", lambda f: f.pairs(Field.name)) or (),
     )
 
 
