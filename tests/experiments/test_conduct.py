@@ -85,6 +85,7 @@ def test_a_quick_experiment_is_a_balanced_tenth() -> None:
             share = {quick: 0.1}.get(some, 1.0) if of == "undisturbed" else part
             assert len(found) == max(1, round(len(every) * share))
             assert len({c.task for c in found}) == min(len(found), len({c.task for c in every}))
+        assert len({r.case.task for r in some if r.profile == "kind"}) >= 4, "not one task alone"
     assert {r.case for r in quick} <= {r.case for r in usual} <= {r.case for r in whole}
     honest = {r.case for r in usual if r.profile == "honest"}
     long = {"long", "long-undisturbed"}
@@ -284,3 +285,15 @@ def computed_row_of(run: Run) -> dict[str, object]:
     from forestall.experiments.worker import Work
 
     return computed_row(Work(run, Settings()))
+
+
+def test_a_quick_experiment_has_every_strategy_and_model_and_fewer_demonstrations() -> None:
+    quick, usual = runs_for(Choice("all", quick=True)), runs_for(Choice("all"))
+    honest = [[r for r in some if r.profile == "honest"] for some in (quick, usual)]
+    who = [{(r.strategy, r.model) for r in some} for some in honest]
+    assert who[0] == who[1]
+    assert {r.demonstrations for r in honest[0]} == {"2 varied"}
+    assert {r.demonstrations for r in honest[1]} == {"8 varied"}
+    of = Choice("all", quick=True, demonstrations=4).runs()
+    assert "4 varied" in {r.demonstrations for r in of}, "as was said"
+    assert len(quick) * 5 < len(usual)

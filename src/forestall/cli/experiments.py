@@ -40,10 +40,12 @@ class Options:
             judges.
         profiles: of the household: honest (motions go wrong, the domain file does not know all) or
             kind. Honest by default, both for `all`.
-        part: of the cases of each set in `all`, from all tasks in turn; 1 for every case, which
-            takes hours.
-        quick: a tenth of it.
-        demonstrations: of each task in the honest household, each another way to do it (1 to 32).
+        part: of the cases of each set in `all`, from all tasks in turn; 0.05 by default, which is
+            about an hour on two cores, 1 for every case, which takes hours.
+        quick: a tenth of it, with fewer demonstrations and fewer strategies on each case: a few
+            minutes.
+        demonstrations: of each task in the honest household, each another way to do it (1 to 32);
+            8 by default, 2 in a quick experiment.
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes), ray, or inline (this process, one after the other).
         address: of a running Ray cluster; a local one is started by default.
@@ -60,9 +62,9 @@ class Options:
     sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
     profiles: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
-    part: float = 0.1
+    part: float | None = None
     quick: Flag = False
-    demonstrations: int = 8
+    demonstrations: int | None = None
     out: Path | None = None
     engine: str = "local"
     address: str | None = None
@@ -125,7 +127,7 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
     from forestall.cli.progress import bar
     from forestall.experiments.conduct import Experiment, conduct
     from forestall.experiments.results import present
-    from forestall.experiments.runs import Choice, Settings
+    from forestall.experiments.runs import PART, Choice, Settings
 
     experiment = Experiment(
         Choice(
@@ -136,7 +138,7 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
             tuple(options.sets or ()),
             tuple(options.strategies or ()),
             tuple(options.profiles or ()),
-            options.part,
+            PART if options.part is None else options.part,
             options.quick,
             options.demonstrations,
         ),

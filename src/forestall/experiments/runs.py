@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import product
-from typing import Any
+from typing import Any, TypeVar
 
 from forestall.assembly.configuration import Choice as Part
 from forestall.assembly.configuration import Given, choices, domain_of, said_domain
@@ -57,16 +57,25 @@ STEPPING_IN = 1 / 6
 
 TURN = 3
 """By so many cases the sets of the honest household are apart, so that a part of each has rooms of
-its own."""
+its own. A part of a set begins with another task than that of the set before."""
 
 ABLATED = 0.5
 """Of RoboFail's cases in "all", those that are run without reasoning or validation, too."""
 
 QUICK = 0.1
-"""Of what is run otherwise, in a quick experiment."""
+"""Of the cases that are run otherwise, in a quick experiment."""
+
+QUICK_DEMONSTRATIONS = 2
+"""Of each task in the honest household, in a quick experiment."""
+
+QUICK_TURN = 3
+"""Of the strategies that step in on a case of a quick experiment every third does, others with the
+next set."""
 
 PAPER_DETECTOR = "scene-graph"
 
+
+T = TypeVar("T")
 
 OWN = (DETECTOR.name, STRATEGY.name)
 """The kinds of parts that an experiment chooses by itself, run by run."""
@@ -160,8 +169,9 @@ class Choice:
         strategies: only these; all by default.
         profiles: of the household; by default the honest one, and for "all" both.
         part: of the cases of each set in "all", from all tasks in turn: `PART` by default.
-        quick: a tenth of that.
-        demonstrations: of each task in the honest household, each another way to do it.
+        quick: a tenth of that, and of the strategies that step in one case of each set has a third.
+        demonstrations: of each task in the honest household, each another way to do it; by default
+            `DEMONSTRATIONS`, `QUICK_DEMONSTRATIONS` in a quick experiment.
     """
 
     experiment: str
@@ -173,7 +183,14 @@ class Choice:
     profiles: tuple[str, ...] = ()
     part: float = PART
     quick: bool = False
-    demonstrations: int = DEMONSTRATIONS
+    demonstrations: int | None = None
+
+    @property
+    def ways(self) -> int:
+        """How many demonstrations of each task there are in the honest household."""
+        if self.demonstrations is not None:
+            return self.demonstrations
+        return QUICK_DEMONSTRATIONS if self.quick else DEMONSTRATIONS
 
     def runs(self) -> tuple[Run, ...]:
         """See `runs_for`."""
@@ -216,14 +233,15 @@ def _in(profile: str, choice: Choice) -> Iterator[Run]:
     """The episodes of an experiment in one household."""
     of_sets = _sets(profile, choice)
     honest = profile == HONEST
-    told = f"{choice.demonstrations} varied" if honest else PLAIN
+    told = f"{choice.ways} varied" if honest else PLAIN
     run = partial(Run, profile=profile, demonstrations=told)
     yield from (run(case, s) for found in of_sets.values() for case in found for s in ALONE)
     if choice.experiment in ("proactive", "all"):
         part = STEPPING_IN if honest and choice.experiment == "all" else 1.0
-        for found in of_sets.values():
+        every = QUICK_TURN if choice.quick else 1
+        for place, found in enumerate(of_sets.values()):
             for case in _some(found, part):
-                yield from _stepping_in(case, run)
+                yield from list(_stepping_in(case, run))[place % every :: every]
     robofail = of_sets[PAPER_SET]
     if choice.experiment == "detection":
         for case, detector in product(robofail, (PAPER_DETECTOR, *BASELINES)):
@@ -254,17 +272,18 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
         if choice.quick:
             part *= QUICK
         if part < 1:
-            every = _some(every, part, TURN * place if honest else 0)
+            every = _some(every, part, TURN * place if honest else 0, place)
         found[of] = _limited(every, choice.limit)
     return found
 
 
-def _some(found: Sequence[Case], part: float, turn: int = 0) -> Sequence[Case]:
+def _some(found: Sequence[Case], part: float, turn: int = 0, task: int = 0) -> Sequence[Case]:
     """A balanced part of the cases of a set, at least one: so many of every task.
 
-    `turn`: with which case of each task it begins; whatever it is, a smaller part is in a larger.
+    `turn`: with which case of each task it begins, and `task`: with which task; whatever they are,
+    a smaller part is in a larger.
     """
-    return _limited(found, max(1, round(len(found) * part)), turn)
+    return _limited(found, max(1, round(len(found) * part)), turn, task)
 
 
 def _check(choice: Choice) -> None:
@@ -274,7 +293,7 @@ def _check(choice: Choice) -> None:
         raise InputError(f"--limit {choice.limit}: at least 1 case of each set is needed")
     if not 0 < choice.part <= 1:
         raise InputError(f"--part {choice.part}: give a number above 0, at most 1")
-    if not 1 <= choice.demonstrations <= MOST:
+    if not 1 <= choice.ways <= MOST:
         raise InputError(f"--demonstrations {choice.demonstrations}: 1 to {MOST} are possible")
     for name in choice.sets:
         if name not in (*CASE_SETS, *FURTHER_SETS):
@@ -300,15 +319,21 @@ def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
     ]
 
 
-def _limited(found: Sequence[Case], limit: int | None, turn: int = 0) -> Sequence[Case]:
+def _limited(
+    found: Sequence[Case], limit: int | None, turn: int = 0, task: int = 0
+) -> Sequence[Case]:
     if limit is None:
         return found
     of_task: dict[str, list[Case]] = {}
     for case in found:
         of_task.setdefault(case.task, []).append(case)
-    for task, several in of_task.items():
-        first = turn % len(several)
-        of_task[task] = several[first:] + several[:first]
-    most = max(map(len, of_task.values()), default=0)
-    in_turn = [several[k] for k in range(most) for several in of_task.values() if k < len(several)]
+    tasks = [_from(turn, several) for several in _from(task, list(of_task.values()))]
+    most = max(map(len, tasks), default=0)
+    in_turn = [several[k] for k in range(most) for several in tasks if k < len(several)]
     return in_turn[:limit]
+
+
+def _from(first: int, things: list[T]) -> list[T]:
+    """The same in a ring, from another one on."""
+    at = first % len(things) if things else 0
+    return things[at:] + things[:at]

@@ -66,7 +66,7 @@ class Chosen(_Model):
     profiles: list[str]
     part: float
     quick: bool
-    demonstrations: int
+    demonstrations: int | None
 
 
 class Call(_Model):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from forestall.tasks.files import load_task
 from forestall.types.observation import Frame, Intrinsics, Observation
@@ -77,3 +78,18 @@ def test_what_is_held_is_counted() -> None:
     large = np.zeros((720, 960, 3), np.uint8)
     part = Frame(large[:72, :96], np.ones((72, 96), np.float32), SMALL, np.eye(4))
     assert Drawn(part).nbytes == large.nbytes + 72 * 96 * 4
+
+
+def test_what_is_kept_has_a_block_of_its_own_and_stays_as_it_is() -> None:
+    large = np.arange(720 * 960 * 3, dtype=np.uint32).astype(np.uint8).reshape(720, 960, 3)
+    ids = np.full((72, 96), 3, np.int32)
+    part = Frame(large[:72, :96], np.ones((72, 96), np.float32), SMALL, np.eye(4), ids)
+    kept = FrameMemory().keep(b"a", Drawn(part))
+    assert np.array_equal(kept.frame.rgb, part.rgb)
+    assert np.array_equal(kept.frame.depth_m, part.depth_m)
+    assert kept.frame.instance_ids is not None and np.array_equal(kept.frame.instance_ids, ids)
+    assert kept.nbytes == 72 * 96 * (3 + 4 + 4)
+    large[:] = 0
+    assert kept.frame.rgb.any(), "no view of what it was made from"
+    with pytest.raises(ValueError, match="read-only"):
+        kept.frame.rgb[:] = 0

@@ -5,7 +5,8 @@ Made by `picture`, kept by `memory`, read by `redrawing`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from mmap import mmap
 from sys import getsizeof
 from typing import Any
 
@@ -71,16 +72,60 @@ class Drawn:
     @property
     def nbytes(self) -> int:
         """Of the memory that is held for it: an array that shows a part of another holds it all."""
-        frame, basis, content = self.frame, self.basis, self.content
-        arrays: list[npt.NDArray[Any] | None] = [frame.rgb, frame.depth_m, frame.instance_ids]
-        if basis is not None:
-            arrays += [basis.geom, basis.normal, basis.reach, basis.smoothed]
-            arrays += [basis.own_at, basis.own_points]
         digests = 0
-        if content is not None:
-            arrays += [content.corners_m, content.instance, content.clear]
-            digests = sum(map(getsizeof, (*content.look, *content.form)))
-        return digests + sum(_held(a).nbytes for a in arrays if a is not None)
+        if self.content is not None:
+            digests = sum(map(getsizeof, (*self.content.look, *self.content.form)))
+        arrays = (a for part, names in self._parts() for a in _of(part, names).values())
+        return digests + sum({id(h): h.nbytes for h in map(_held, arrays)}.values())
+
+    def packed(self) -> Drawn:
+        """The same in a block of memory of its own, read-only.
+
+        Among what comes and goes between one frame and the next, what is kept for long would leave
+        holes that the process cannot give back: it grew by two thirds of what it remembered.
+        """
+        parts = [(part, _of(part, names)) for part, names in self._parts()]
+        sizes = [_rounded(a.nbytes) for _, arrays in parts for a in arrays.values()]
+        block, at = mmap(-1, max(sum(sizes), 1)), 0
+        made: list[Any] = []
+        for part, arrays in parts:
+            copies = {}
+            for name, array in arrays.items():
+                copy = np.frombuffer(block, array.dtype, array.size, at).reshape(array.shape)
+                copy[...] = array
+                copy.flags.writeable = False
+                copies[name] = copy
+                at += _rounded(array.nbytes)
+            made.append(replace(part, **copies))
+        frame, *rest = made
+        content = next((p for p in rest if isinstance(p, Content)), None)
+        basis = next((p for p in rest if isinstance(p, Basis)), None)
+        return Drawn(frame, content, basis)
+
+    def _parts(self) -> list[tuple[Any, tuple[str, ...]]]:
+        """What it consists of, each with the names of its arrays."""
+        found: list[tuple[Any, tuple[str, ...]]] = [(self.frame, _PICTURES)]
+        if self.content is not None:
+            found.append((self.content, ("corners_m", "instance", "clear")))
+        if self.basis is not None:
+            found.append((self.basis, tuple(self.basis.__dataclass_fields__)))
+        return found
+
+
+_PICTURES = ("rgb", "depth_m", "instance_ids")
+
+_ALIGNED = 64
+"""Bytes: what an array of any type may begin at."""
+
+
+def _rounded(size: int) -> int:
+    return -(-size // _ALIGNED) * _ALIGNED
+
+
+def _of(part: Any, names: tuple[str, ...]) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of a part that it has."""
+    found = {name: getattr(part, name) for name in names}
+    return {name: array for name, array in found.items() if array is not None}
 
 
 def _held(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

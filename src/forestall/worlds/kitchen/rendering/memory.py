@@ -54,14 +54,18 @@ class FrameMemory:
         """The frames of the same place, the latest first."""
         return (self._frames[key][0] for key in reversed(self._places.get(place, ())))
 
-    def keep(self, key: bytes, drawn: Drawn, place: bytes = b"") -> None:
+    def keep(self, key: bytes, drawn: Drawn, place: bytes = b"") -> Drawn:
         """Remember a frame, forgetting those that were not asked for the longest time.
 
         Args:
             key: of all that the frame shows.
             drawn: the frame.
             place: of the camera and the lights alone.
+
+        Returns:
+            The frame as it is kept: the one to use, so that the given one is not held, too.
         """
+        drawn = drawn.packed()
         self._frames[key] = drawn, place
         if place:
             self._places.setdefault(place, []).append(key)
@@ -73,3 +77,4 @@ class FrameMemory:
                 self._places[there].remove(old)
                 if not self._places[there]:
                     del self._places[there]
+        return drawn

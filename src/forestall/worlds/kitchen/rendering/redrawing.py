@@ -86,10 +86,7 @@ class RedrawingRenderer:
         found = self._memory.get(key)
         if found is None:
             found = self._redrawn(place, content, data, pose) or self._drawn(content, data, pose)
-            for array in (found.frame.rgb, found.frame.depth_m, found.frame.instance_ids):
-                if array is not None:
-                    array.flags.writeable = False
-            self._memory.keep(key, found, place)
+            found = self._memory.keep(key, found, place)
         return found.frame
 
     def _drawn(self, content: Content, data: Any, pose: npt.NDArray[np.float64]) -> Drawn:

@@ -53,12 +53,7 @@ class RememberingRenderer:
             return found.frame
         if self._inner is None:
             self._inner = self._make()
-        frame = self._inner.render(data, camera_to_world)
-        for array in (frame.rgb, frame.depth_m, frame.instance_ids):
-            if array is not None:
-                array.flags.writeable = False
-        self._memory.keep(key, Drawn(frame))
-        return frame
+        return self._memory.keep(key, Drawn(self._inner.render(data, camera_to_world))).frame
 
     def _key(self, data: Any, camera_to_world: npt.NDArray[np.float64]) -> bytes:
         mujoco.mj_saveModel(self._model, None, self._buffer)
