@@ -82,7 +82,8 @@ class Drawn:
         """The same in a block of memory of its own, read-only.
 
         Among what comes and goes between one frame and the next, what is kept for long would leave
-        holes that the process cannot give back: it grew by two thirds of what it remembered.
+        holes that the process cannot give back: it grew by 150 MB an episode, however little was
+        remembered besides.
         """
         parts = [(part, _of(part, names)) for part, names in self._parts()]
         sizes = [_rounded(a.nbytes) for _, arrays in parts for a in arrays.values()]
