@@ -108,9 +108,11 @@ class EmbeddingRetriever:
             raise MemoryFileError(
                 "the memory holds no demonstrations: add some with 'forestall demos add'"
             )
-        self._matrix = encoder.encode(
-            [subtask_words(e.step.subtask, domain) for e in self._entries]
-        )
+        words = [subtask_words(e.step.subtask, domain) for e in self._entries]
+        texts = list(dict.fromkeys(words))
+        place = {text: i for i, text in enumerate(texts)}
+        self._texts = encoder.encode(texts)
+        self._text = np.array([place[w] for w in words])
         self._tasks = np.array([e.demonstration.task for e in self._entries])
         self._indices = np.array([e.step.index for e in self._entries])
         self._skills = np.array([domain.family(e.step.subtask) for e in self._entries])
@@ -118,6 +120,7 @@ class EmbeddingRetriever:
         for e in self._entries:
             sort = (_kinds(e.step.subtask.args, domain), e.demonstration.task)
             self._sorts[domain.family(e.step.subtask)].setdefault(sort, []).append(e)
+        self._made: dict[tuple[int, float], Reference] = {}
 
     def retrieve(self, subtask: Subtask, task: str, done: int) -> Sequence[Reference]:
         """References for a subtask, best first; none above the floor and no role: an empty list.
@@ -130,24 +133,31 @@ class EmbeddingRetriever:
 
     def _scenes(self, subtask: Subtask, task: str, done: int) -> list[Reference]:
         config = self._config
-        similarity = self._matrix @ self._encoder.encode([subtask_words(subtask, self._domain)])[0]
-        similarity = np.minimum(np.round(similarity.astype(np.float64), 6), 1.0)
+        alike = self._texts @ self._encoder.encode([subtask_words(subtask, self._domain)])[0]
+        similarity = np.minimum(np.round(alike.astype(np.float64), 6), 1.0)[self._text]
         allowed = similarity >= config.floor
         if config.same_skill:
             allowed &= self._skills == self._domain.family(subtask)
-        rank = similarity + config.same_task_bonus * (self._tasks == task)
-        gap = np.abs(self._indices - done)
+        near = np.flatnonzero(allowed)
+        rank = similarity[near] + config.same_task_bonus * (self._tasks[near] == task)
+        gap = np.abs(self._indices[near] - done)
         found: list[Reference] = []
         used: dict[int, int] = {}
-        for i in np.lexsort((np.arange(len(rank)), gap, -rank)).tolist():
-            entry = self._entries[i]
-            owner = id(entry.demonstration)
-            if not allowed[i] or used.get(owner, 0) >= config.per_demonstration:
+        for i in near[np.lexsort((near, gap, -rank))].tolist():
+            owner = id(self._entries[i].demonstration)
+            if used.get(owner, 0) >= config.per_demonstration:
                 continue
             used[owner] = used.get(owner, 0) + 1
-            found.append(_reference(entry, float(similarity[i])))
+            found.append(self._reference(i, float(similarity[i])))
             if len(found) == config.k:
                 break
+        return found
+
+    def _reference(self, place: int, similarity: float) -> Reference:
+        """Made once: at every look of every boundary many are handed out."""
+        found = self._made.get((place, similarity))
+        if found is None:
+            found = self._made[place, similarity] = _reference(self._entries[place], similarity)
         return found
 
     def _roles(self, subtask: Subtask, task: str, but: set[str]) -> list[Reference]:
