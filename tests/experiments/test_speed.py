@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from forestall.errors import FileFormatError, InputError
 from forestall.experiments import speed
+from forestall.experiments.boundary_speed import boundary_times
 from forestall.experiments.engines import make_lanes
 from forestall.experiments.folder import ROWS
 from forestall.experiments.speed import GROUPS, Timed, Timing, measure
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.plan import Subtask
+from planning.corpus import DOMAIN, scene
 
 TAKE = speed.take  # the real one, which the others do without
 taken: list[str] = []
@@ -50,6 +55,17 @@ def test_timings_of_another_kind_are_not_mixed_in(tmp_path: Path) -> None:
     (tmp_path / ROWS).write_text("{}\n")
     with pytest.raises(FileFormatError, match="line 1: the document lacks 'key'"):
         measure(3, 0, tmp_path, lambda *_: None)
+
+
+def test_a_boundary_is_timed_at_every_step_of_a_run_once_a_round() -> None:
+    steps = []
+    for index, text in enumerate(("navigate_to_obj(Mug-1)", "pick_up(Mug-1)")):
+        step = Subtask.parse(text)
+        seen = scene("Mug-1 on CounterTop-1, CounterTop-1, Sink-1, Faucet-1")
+        steps.append(DemonstrationStep(index, step, replace(seen, subtask=step), seen))
+    runs = [Demonstration("make-coffee", "room", k, tuple(steps), id=f"d{k}") for k in range(2)]
+    times = boundary_times(runs, 5, 3, DOMAIN)
+    assert len(times) == 3 * len(steps) and min(times) > 0
 
 
 @pytest.mark.slow

@@ -25,6 +25,7 @@ from forestall.comparison.timing import score_times
 from forestall.domain.model import Domain
 from forestall.errors import ForestallError
 from forestall.experiments import yard
+from forestall.experiments.boundary_speed import boundary_times
 from forestall.experiments.conduct import Progress
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
@@ -43,11 +44,14 @@ KIND = "speed"
 TASK = "heat-potato"
 """What is timed."""
 
-GROUPS = ("pictures and graphs", "comparisons", "plans", "episodes")
+GROUPS = ("pictures and graphs", "comparisons", "boundaries", "plans", "episodes")
 """What is timed together, in this order."""
 
 THINGS = 200
 """In the yard in which is planned."""
+
+STORED = 1000
+"""Demonstrations in the memory against which a boundary is judged."""
 
 REPEAT = 10
 """How often each is timed when nothing is said."""
@@ -138,8 +142,9 @@ def take(job: Timing) -> Timed:
     parts: dict[str, Callable[[], list[dict[str, Any]]]] = {
         GROUPS[0]: lambda: _pictures(job.repeat, job.seed),
         GROUPS[1]: lambda: _comparisons(job.repeat, job.seed),
-        GROUPS[2]: lambda: _large_plans(job.repeat, job.seed),
-        GROUPS[3]: lambda: _episodes(job.seed),
+        GROUPS[2]: lambda: _boundaries(job.repeat),
+        GROUPS[3]: lambda: _large_plans(job.repeat, job.seed),
+        GROUPS[4]: lambda: _episodes(job.seed),
     }
     return Timed(job.group, tuple(parts[job.group]()), _machine())
 
@@ -235,6 +240,15 @@ def _comparisons(repeat: int, seed: int) -> list[dict[str, Any]]:
         times = [1000 * t for t in score_times(count, 30, seed, domain, repeat)]
         rows.append(_row(f"1 graph against {count} of 30 nodes", "ms", times, aim))
     return rows
+
+
+def _boundaries(repeat: int) -> list[dict[str, Any]]:
+    """Of a task with the demonstrations that it has, repeated."""
+    demonstrations, _ = load_memory(run_config(TASK))
+    domain = load_task(TASK).domain
+    times = boundary_times(demonstrations, STORED, repeat, domain)
+    what = f"a boundary, three judges, {STORED} demonstrations"
+    return [_row(what, "ms", [1000 * t for t in times], 20)]
 
 
 def _episodes(seed: int) -> list[dict[str, Any]]:
