@@ -297,3 +297,21 @@ def test_a_quick_experiment_has_every_strategy_and_model_and_fewer_demonstration
     of = Choice("all", quick=True, demonstrations=4).runs()
     assert "4 varied" in {r.demonstrations for r in of}, "as was said"
     assert len(quick) * 5 < len(usual)
+
+
+def test_in_a_transfer_nobody_has_shown_the_task_at_hand() -> None:
+    runs = runs_for(Choice("transfer", profiles=("honest", "kind")))
+    assert {r.strategy for r in runs} == {"watch"}
+    assert {r.case for r in runs if r.profile == "honest"} == {
+        r.case for r in runs_for(Choice("all", strategies=("watch",), profiles=("honest",)))
+    }
+    for run in runs:
+        assert run.case.task not in run.shown_in
+        assert len(run.shown_in) == (9 if run.case.task in TEN else 10)
+    assert {r.demonstrations for r in runs} == {"8 varied of other tasks", "4 of other tasks"}
+    assert len({r.key for r in runs}) == len(runs)
+    own = runs_for(Choice("all"))
+    assert {r.shown_in for r in own} == {(r.case.task,) for r in own}
+
+
+TEN = {c.task for c in cases("undisturbed", "test")}

@@ -92,6 +92,11 @@ def ablation(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> i
     return _experiment("ablation", options, parts)
 
 
+def transfer(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
+    """Judges with the demonstrations of the other nine tasks alone: none of the task at hand."""
+    return _experiment("transfer", options, parts)
+
+
 def everything(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
     """All of them, on one set of episodes."""
     return _experiment("all", options, parts)
@@ -118,7 +123,7 @@ def report(
 
 def register(bench: App) -> None:
     """Add the experiments to `forestall bench`."""
-    for command in (proactive, detection, ablation, report):
+    for command in (proactive, detection, ablation, transfer, report):
         bench.command(command)
     bench.command(everything, name="all")
 

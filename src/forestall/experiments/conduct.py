@@ -161,10 +161,12 @@ def _memories(
     """A run with each ready-made memory that runs need, how many ways it has, and where."""
     wanted: dict[tuple[str, str, int], RunConfig] = {}
     for run in runs:
-        key = (run.profile, run.case.task, varied(run))
-        config = None if key in wanted else config_of(run, experiment.settings)
-        if config is not None and needs_memory(config) and memory_path(config) is None:
-            wanted[key] = config
+        for task in run.shown_in:
+            key = (run.profile, task, varied(run))
+            shown = replace(run, case=replace(run.case, task=task, scenario=None))
+            config = None if key in wanted else config_of(shown, experiment.settings)
+            if config is not None and needs_memory(config) and memory_path(config) is None:
+                wanted[key] = config
     ordered = sorted(wanted.items(), key=lambda item: item[0])
     return [(config, ways, second_of(profile)) for (profile, _, ways), config in ordered]
 

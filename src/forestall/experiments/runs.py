@@ -25,7 +25,7 @@ from forestall.statistics.rows import EXACT, HONEST, KIND, PLAIN, Setup
 from forestall.statistics.watches import PAPER_SET
 from forestall.tasks.variation import MOST
 
-EXPERIMENTS = ("proactive", "detection", "ablation", "all")
+EXPERIMENTS = ("proactive", "detection", "ablation", "transfer", "all")
 
 PAGES = ("all", "telling", "none")
 """Telling are the proactive runs of failing cases, and those in which it raised a false alarm."""
@@ -76,6 +76,12 @@ PAPER_DETECTOR = "scene-graph"
 
 
 T = TypeVar("T")
+
+_WITH_PART = ("transfer", "all")
+"""Experiments that take a part of every set, and all undisturbed runs of the honest household."""
+
+_ELSEWHERE = " of other tasks"
+"""Ends what is said of a memory that has none of the task at hand."""
 
 OWN = (DETECTOR.name, STRATEGY.name)
 """The kinds of parts that an experiment chooses by itself, run by run."""
@@ -146,6 +152,13 @@ class Run:
         return Setup.of(self)
 
     @property
+    def shown_in(self) -> tuple[str, ...]:
+        """The tasks whose demonstrations it has."""
+        if not self.demonstrations.endswith(_ELSEWHERE):
+            return (self.case.task,)
+        return tuple(t for t in _tasks() if t != self.case.task)
+
+    @property
     def key(self) -> str:
         """As `EpisodeRow.key`."""
         return self.setup.key(self.case)
@@ -168,7 +181,8 @@ class Choice:
         sets: only cases of these; all by default.
         strategies: only these; all by default.
         profiles: of the household; by default the honest one, and for "all" both.
-        part: of the cases of each set in "all", from all tasks in turn: `PART` by default.
+        part: of the cases of each set in "all" and "transfer", from all tasks in turn: `PART` by
+            default.
         quick: a tenth of that, and of the strategies that step in one case of each set has a third.
         demonstrations: of each task in the honest household, each another way to do it; by default
             `DEMONSTRATIONS`, `QUICK_DEMONSTRATIONS` in a quick experiment.
@@ -234,14 +248,19 @@ def _in(profile: str, choice: Choice) -> Iterator[Run]:
     of_sets = _sets(profile, choice)
     honest = profile == HONEST
     told = f"{choice.ways} varied" if honest else PLAIN
+    if choice.experiment == "transfer":
+        found = (c for several in of_sets.values() for c in several)
+        told = f"{told}{_ELSEWHERE}"
+        yield from (Run(c, "watch", profile=profile, demonstrations=told) for c in found)
+        return
     run = partial(Run, profile=profile, demonstrations=told)
     yield from (run(case, s) for found in of_sets.values() for case in found for s in ALONE)
     if choice.experiment in ("proactive", "all"):
         part = STEPPING_IN if honest and choice.experiment == "all" else 1.0
-        every = QUICK_TURN if choice.quick else 1
-        for place, found in enumerate(of_sets.values()):
-            for case in _some(found, part):
-                yield from list(_stepping_in(case, run))[place % every :: every]
+        turn = QUICK_TURN if choice.quick else 1
+        for place, several in enumerate(of_sets.values()):
+            for case in _some(several, part):
+                yield from list(_stepping_in(case, run))[place % turn :: turn]
     robofail = of_sets[PAPER_SET]
     if choice.experiment == "detection":
         for case, detector in product(robofail, (PAPER_DETECTOR, *BASELINES)):
@@ -268,7 +287,8 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
     found = {}
     for place, of in enumerate((*CASE_SETS, *FURTHER_SETS) if honest else CASE_SETS):
         every: Sequence[Case] = cases(of, choice.split, choice.rounds, further=honest)
-        part = 1.0 if choice.experiment != "all" or (honest and of == UNDISTURBED) else choice.part
+        whole = choice.experiment not in _WITH_PART or (honest and of == UNDISTURBED)
+        part = 1.0 if whole else choice.part
         if choice.quick:
             part *= QUICK
         if part < 1:
@@ -284,6 +304,12 @@ def _some(found: Sequence[Case], part: float, turn: int = 0, task: int = 0) -> S
     a smaller part is in a larger.
     """
     return _limited(found, max(1, round(len(found) * part)), turn, task)
+
+
+@cache
+def _tasks() -> tuple[str, ...]:
+    """Those of the undisturbed runs."""
+    return tuple(sorted({c.task for c in cases(UNDISTURBED, "test")}))
 
 
 def _check(choice: Choice) -> None:

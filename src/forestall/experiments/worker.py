@@ -22,7 +22,7 @@ from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
 from forestall.seams import WorldPart
-from forestall.statistics.rows import EXACT, KIND, PLAIN, EpisodeRow, Judged
+from forestall.statistics.rows import EXACT, KIND, EpisodeRow, Judged
 from forestall.statistics.watches import WATCH
 from forestall.tasks.causes import causes
 from forestall.tasks.faults import knowable
@@ -92,13 +92,13 @@ def config_of(run: Run, settings: Settings) -> RunConfig:
 
 def counts_of(run: Run) -> tuple[int, ...]:
     """With how many of the demonstrations judges are watched, where they differ from each other."""
-    count = varied(run)
+    count = varied(run) if run.shown_in == (run.case.task,) else 0
     return tuple(2**k for k in range(count.bit_length()) if 2**k <= count)
 
 
 def varied(run: Run) -> int:
     """How many varied demonstrations a run has, 0 where they are plain."""
-    return 0 if run.demonstrations == PLAIN else int(run.demonstrations.split()[0])
+    return int(run.demonstrations.split()[0]) if "varied" in run.demonstrations else 0
 
 
 def second_of(profile: str) -> Given | None:
@@ -166,7 +166,9 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
     demonstrations, memory = None, None
     if needs_memory(prepared.config):
         run = work.run
-        demonstrations, memory = _memory(run.case.task, run.profile, varied(run), work.settings)
+        found = [_memory(t, run.profile, varied(run), work.settings) for t in run.shown_in]
+        demonstrations = tuple(d for shown, _ in found for d in shown)
+        memory = ", ".join(name for _, name in found)
     folder = work.page_folder
     recorder = None if folder is None else RunRecorder(folder, page="index.html")
     listeners = [] if recorder is None else [recorder]
