@@ -5,6 +5,7 @@ Whatever goes wrong in an episode becomes a row that says so: it counts as a fai
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from dataclasses import dataclass, replace
 from functools import cache
@@ -168,7 +169,7 @@ def _record(work: Work, prepared: Prepared, trace: TruthTrace) -> EpisodeRecord:
         run = work.run
         found = [_memory(t, run.profile, varied(run), work.settings) for t in run.shown_in]
         demonstrations = tuple(d for shown, _ in found for d in shown)
-        memory = ", ".join(name for _, name in found)
+        memory = _name_of([name for _, name in found])
     folder = work.page_folder
     recorder = None if folder is None else RunRecorder(folder, page="index.html")
     listeners = [] if recorder is None else [recorder]
@@ -341,6 +342,14 @@ def _memory(
     config = run_config(task, given=_household(profile, settings))
     demonstrations, path = load_memory(config, workers=1, varied=ways, second=second_of(profile))
     return tuple(demonstrations), Path(path).name
+
+
+def _name_of(memories: list[str]) -> str:
+    """The name of a memory, or of several, whose names tell their content."""
+    if len(memories) == 1:
+        return memories[0]
+    digest = hashlib.blake2b("\n".join(memories).encode(), digest_size=8).hexdigest()
+    return f"{len(memories)}-memories-{digest}"
 
 
 __all__ = [
