@@ -37,7 +37,7 @@ def test_of_several_answers_to_one_trial_the_last_counts(tmp_path: Path) -> None
     study = make(tmp_path, 5, Design(2))
     file = AnswerFile(file_of(tmp_path, 2), Start(study.digest, 2, False))
     for choice in ("a", "b", "both"):
-        file.add(Answer(0, choice))  # type: ignore[arg-type]
+        file.add(Answer(0, choice))
     (rater,) = read_raters(tmp_path, study)
     assert rater.answers[0].choice == "both" and rater.next_trial(5) == 1
 

@@ -11,8 +11,11 @@ import pytest
 
 from forestall.study.answers import read_raters
 from forestall.study.assigning import Design
+from forestall.study.reporting import report_of, report_page
+from forestall.study.simulated import simulate, write_simulated
 
 from .studies import LONG, NASTY, make
+from .test_reporting import TASTE
 from .test_serving import served
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -58,17 +61,17 @@ def test_a_study_is_answered_by_mouse_and_keys_killed_and_resumed(
         page.get_by_label("A name or code").fill(LONG)
         page.get_by_label("I have read this").check()
         page.get_by_role("button", name="Begin").click()
+        reached(page, 1, count)
         assert_fits(page)
-        assert page.title() == f"1 of {count}"
         page.get_by_role("button", name="A is better").click()
-        page.wait_for_url("**/trial")
+        reached(page, 2, count)
         page.keyboard.press("s")
-        page.wait_for_function(f"document.title == '3 of {count}'")
+        reached(page, 3, count)
         page.keyboard.press("Backspace")
-        page.wait_for_function(f"document.title == '2 of {count}'")
+        reached(page, 2, count)
         assert page.get_by_role("button", name="Both or cannot tell", pressed=True).is_visible()
         page.keyboard.press("b")
-        page.wait_for_function(f"document.title == '3 of {count}'")
+        reached(page, 3, count)
         page.get_by_text("Pause").click()
         assert page.get_by_role("link", name="your own link").is_visible()
         assert_fits(page)
@@ -78,7 +81,7 @@ def test_a_study_is_answered_by_mouse_and_keys_killed_and_resumed(
         page = page_of(chromium, where, storage_state=state)
         page.goto(server.address)
         for k in range(2, count):
-            page.wait_for_function(f"document.title == '{k + 1} of {count}'")
+            reached(page, k + 1, count)
             page.keyboard.press("a")
         page.get_by_role("heading", name="Thank you").wait_for()
         page.get_by_role("button", name="Next person").click()
@@ -103,6 +106,42 @@ def test_without_javascript_it_works_as_well(tmp_path: Path, chromium: Any) -> N
         page.context.close()
     (rater,) = read_raters(tmp_path, study)
     assert {a.choice for a in rater.answers.values()} == {"both"}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_that_a_screen_reader_would_miss(
+    tmp_path: Path, chromium: Any, scheme: str
+) -> None:
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright", reason="axe is missing"
+    ).Axe()
+    study = make(tmp_path, 1, Design(1))
+    page = page_of(chromium, "phone", color_scheme=scheme, bypass_csp=True)
+    with served(tmp_path) as server:
+        page.goto(server.address)
+        found = [axe.run(page)]
+        page.get_by_label("I have read this").check()
+        page.get_by_role("button", name="Begin").click()
+        reached(page, 1, len(study.raters[0]))
+        found.append(axe.run(page))
+        page.keyboard.press("a")
+        page.get_by_role("heading", name="Thank you").wait_for()
+        found.append(axe.run(page))
+    larger = make(tmp_path / "larger", 30, Design(8))
+    write_simulated(tmp_path / "larger", simulate(larger, TASTE, seed=1))
+    page.set_content(report_page(report_of(larger, tmp_path / "larger")))
+    found.append(axe.run(page))
+    page.context.close()
+    assert [f.violations_count for f in found] == [0] * 4, [
+        f.generate_report() for f in found if f.violations_count
+    ]
+
+
+def reached(page: Any, number: int, count: int) -> None:
+    """Wait until a comparison is shown and its keys work."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    expect(page).to_have_title(f"{number} of {count}", timeout=120_000)
+    page.wait_for_load_state()
 
 
 def assert_fits(page: Any) -> None:

@@ -82,6 +82,7 @@ def test_a_watched_failure_becomes_an_item(tmp_path: Path) -> None:
     said = {e.detector: e for e in item.explanations}
     assert list(said) == ["scene-graph", *AGAINST]
     assert "the bowl is inside the microwave" in said["scene-graph"].text
+    assert "something is in or on the microwave" in said["preconditions"].text
     assert "now: 1 bowl" in said["objects"].text and "-1" not in said["scene-graph"].text
     assert all(e.writer == "templates" for e in said.values())
     assert any("strategy proactive" in why for why in study.left_out)

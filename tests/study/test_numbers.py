@@ -38,8 +38,8 @@ TASTE = Taste({"objects": 0.3, "caption": 0.9, "image": 1.6})
 
 
 def test_alpha_is_the_published_one() -> None:
-    units = {k: [o[k] for o in OBSERVERS if o[k] is not None] for k in range(12)}
-    assert alpha(dict(units)) == pytest.approx(0.743, abs=5e-4)
+    units = {k: [v for o in OBSERVERS if (v := o[k]) is not None] for k in range(12)}
+    assert alpha({k: v for k, v in units.items()}) == pytest.approx(0.743, abs=5e-4)
     assert alpha({1: ["x", "x"], 2: ["y", "y"]}) == 1
     assert alpha({1: ["x", "y"], 2: ["x", "y"]}) == pytest.approx(-0.5)
     assert alpha({1: ["x"], 2: ["y"]}) is None and alpha({1: ["x", "x"]}) is None

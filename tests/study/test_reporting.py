@@ -17,6 +17,11 @@ from .studies import AGAINST, NASTY, make
 TASTE = Taste({"objects": 0.3, "caption": 0.9, "image": 1.6})
 
 
+def table(file: Path) -> list[dict[str, str]]:
+    with file.open(newline="", encoding="utf-8") as lines:
+        return list(csv.DictReader(lines))
+
+
 def test_simulated_raters_are_no_people(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study = make(tmp_path, 40, Design(15))
     write_simulated(tmp_path, simulate(study, TASTE, seed=1)[1:])
@@ -34,7 +39,7 @@ def test_simulated_raters_are_no_people(tmp_path: Path, capsys: pytest.CaptureFi
     data = write_report(tmp_path).data
     assert data["people"]["raters"] == 1 and data["people"]["answers"] <= 1
     assert data["simulated"]["raters"] == 14
-    rows = list(csv.DictReader((tmp_path / "answers.csv").open()))
+    rows = table(tmp_path / "answers.csv")
     assert [r["simulated"] for r in rows].count("False") == 1 and "a person" not in str(rows)
 
 
@@ -73,5 +78,5 @@ def test_what_is_shown_is_exported_blind(tmp_path: Path) -> None:
         item = study.item(trial.item)
         assert right == (item.cause if trial.check else item.said_by(study.ours))
         assert (tmp_path / row["actual_picture"]).is_file()
-    table = list(csv.DictReader((tmp_path / "export" / "trials.csv").open(newline="")))
-    assert len(table) == len(rows) and any(r["task"].startswith("'=") for r in table)
+    plain = table(tmp_path / "export" / "trials.csv")
+    assert len(plain) == len(rows) and any(r["task"].startswith("'=") for r in plain)

@@ -7,13 +7,14 @@ next writer takes away: the rater was never told that it was kept.
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter
 
@@ -29,6 +30,8 @@ CHOICES: tuple[Choice, ...] = ("a", "b", "both")
 
 MOST_NAME = 300
 """Characters that a rater's name may have."""
+
+L = TypeVar("L", "Start", "Answer")
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -126,7 +129,7 @@ class AnswerFile:
 
     def _append(self, line: Start | Answer) -> None:
         with naming(self.path), self.path.open("ab") as file:
-            file.write(_adapter(type(line)).dump_json(line) + b"\n")
+            file.write(json.dumps(asdict(line), ensure_ascii=False).encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())
 
@@ -151,7 +154,7 @@ def read_answers(path: Path, study: Study) -> Rater | None:
             if start is None:
                 start = _start(line, path, study)
             else:
-                answer = _line(Answer, line)
+                answer = _line(_answers(), line)
                 count = len(study.raters[start.rater - 1])
                 if not 0 <= answer.trial < count:
                     raise FileFormatError(f"trial {answer.trial} of {count}")
@@ -173,7 +176,7 @@ def now() -> float:
 
 
 def _start(line: str, path: Path, study: Study) -> Start:
-    start = _line(Start, line)
+    start = _line(_starts(), line)
     if start.study != study.digest:
         raise FileFormatError("answers to another study than the one in study.json")
     if not 1 <= start.rater <= len(study.raters):
@@ -183,9 +186,9 @@ def _start(line: str, path: Path, study: Study) -> Start:
     return start
 
 
-def _line(kind: type[Any], line: str) -> Any:
+def _line(adapter: TypeAdapter[L], line: str) -> L:
     parse_json(line)
-    return validated_json(_adapter(kind), line)
+    return validated_json(adapter, line)
 
 
 def _mend(path: Path) -> None:
@@ -209,8 +212,13 @@ def _sync_folder(folder: Path) -> None:
 
 
 @cache
-def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
+def _starts() -> TypeAdapter[Start]:
+    return TypeAdapter(Start)
+
+
+@cache
+def _answers() -> TypeAdapter[Answer]:
+    return TypeAdapter(Answer)
 
 
 __all__ = [

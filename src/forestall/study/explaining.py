@@ -38,8 +38,6 @@ from forestall.types.verdict import Decision, Reference, Verdict
 REASONING = "scene-graph + reasoning"
 """Name of what the reasoner makes of the first detector's alarm; its cause is the explanation."""
 
-_LACKING = "{} should hold, and does not"
-
 
 @dataclass(frozen=True, slots=True)
 class Remembered:
@@ -136,7 +134,7 @@ class Explainer:
             found: Sequence[str] = noticed(verdict, boundary.scoped, self._observation(boundary))
             return tuple(found)
         told = tuple(d.text for d in verdict.discrepancies)
-        lacking = tuple(_LACKING.format(fact) for fact in verdict.lacking)
+        lacking = tuple(f"not {fact}" for fact in verdict.lacking)
         return told or lacking or ((verdict.note,) if verdict.note else ())
 
     def _seen(self, nearest: Reference | None) -> Reference | None:

@@ -23,8 +23,6 @@ from forestall.reading.models import validated_json
 STUDY_NAME = "study.json"
 PICTURES_NAME = "pictures"
 ANSWERS_NAME = "answers"
-STUDY_FORMAT = 1
-
 CAUSE = "the true cause"
 """What is right in an attention check, in the place of a detector's name."""
 
@@ -125,7 +123,7 @@ class Study:
     left_out: dict[str, int] = field(hash=False)
     version: str
     kind: Literal["human study"] = "human study"
-    format: Literal[1] = STUDY_FORMAT
+    format: Literal[1] = 1
 
     def item(self, name: str) -> Item:
         """An item by its name."""

@@ -9,6 +9,7 @@ that alone hides a difference, more items are needed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -78,7 +79,7 @@ def detectable(variance: Variance, raters: int, items: int, each: float) -> floa
         items: how many are shown beside one rival.
         each: answers of each rater about one rival.
     """
-    return _reach() * variance.of_mean(raters, items, each) ** 0.5
+    return _reach() * math.sqrt(variance.of_mean(raters, items, each))
 
 
 def raters_needed(variance: Variance, difference: float, items: int, each: float) -> int | None:

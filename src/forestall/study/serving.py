@@ -159,7 +159,7 @@ class StudyServer(ThreadingHTTPServer):
     @property
     def address(self) -> str:
         """What to open in a browser."""
-        host, port = self.server_address[:2]
+        host, port = map(str, self.server_address[:2])
         return f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{port}/"
 
     def handle_error(self, request: object, client_address: object) -> None:
