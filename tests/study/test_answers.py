@@ -33,6 +33,26 @@ def test_a_kill_at_any_byte_costs_no_answer_that_was_kept(tmp_path: Path) -> Non
             assert again is not None and set(again.answers) == {*range(kept - 1), 3}
 
 
+def test_what_does_not_fit_on_the_disk_is_taken_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = make(tmp_path, 5, Design(2))
+    path = file_of(tmp_path, 1)
+    file = AnswerFile(path, Start(study.digest, 1, False))
+    whole = path.read_bytes()
+
+    def full(handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched, pytest.raises(OSError, match="No space"):
+        patched.setattr("os.fsync", full)
+        file.add(Answer(0, "a"))
+    assert path.read_bytes() == whole
+    file.add(Answer(0, "b"))
+    rater = read_answers(path, study)
+    assert rater is not None and rater.answers[0].choice == "b"
+
+
 def test_of_several_answers_to_one_trial_the_last_counts(tmp_path: Path) -> None:
     study = make(tmp_path, 5, Design(2))
     file = AnswerFile(file_of(tmp_path, 2), Start(study.digest, 2, False))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -15,9 +16,13 @@ from forestall.assembly.recording import RecordingJob, record_one
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.errors import InputError, UnknownNameError
+from forestall.experiments.runs import Run, Settings
+from forestall.experiments.worker import broken_row, prepared_run
 from forestall.llm.explaining import ModelWriter, TemplateWriter
 from forestall.memory.store import open_store
 from forestall.records.record import read_record, write_record
+from forestall.statistics.cases import Case
+from forestall.statistics.rows import EpisodeRow
 from forestall.study.explaining import REASONING, Explainer, memory_of
 from forestall.study.making import Asked, make_study
 from forestall.study.model import read_study
@@ -148,6 +153,52 @@ def test_a_model_writes_where_it_answers_and_is_named(tmp_path: Path) -> None:
     first, second = study.items[0].explanations
     assert first.text == "The bowl is in the way." and first.writer == "model"
     assert second.writer == "templates" and "now: 1 bowl" in second.text
+
+
+def experiment(folder: Path, *rows: EpisodeRow, **records: EpisodeRecord) -> Path:
+    """A folder of results with a page for each of its watched episodes."""
+    folder.mkdir()
+    (folder / "experiment.json").write_text("{}")
+    lines = [json.dumps(row.to_json()) for row in rows]
+    (folder / "episodes.jsonl").write_text("\n".join([*lines, ""]))
+    for row in rows:
+        kept(folder / "episodes" / row.key, records[(row.scenario and "failing") or "twin"])
+    return folder
+
+
+def row_of(scenario: str | None, **fields: Any) -> EpisodeRow:
+    case = Case("robofail" if scenario else "undisturbed", TASK, scenario, SEED)
+    run = Run(case, "watch")
+    empty = broken_row(run, "", prepared_run(run, Settings(SYMBOLIC)))
+    return replace(empty, **{"profile": "honest", "known": None, "effect": None, **fields})
+
+
+def test_an_experiment_says_when_a_run_was_lost(tmp_path: Path) -> None:
+    records = {"failing": watched(SCENARIO), "twin": watched(None)}
+    twin = row_of(None, success=True)
+    lost = row_of(SCENARIO, known=8, effect=9)
+    results = experiment(tmp_path / "lost", lost, twin, **records)
+    (failure,) = runs_in([results]).failures
+    assert (failure.known, failure.effect, failure.profile) == (8, 9, "honest")
+    study = make_study(tmp_path / "study", [results], asked())
+    assert study.items[0].source["boundary"] in (8, 9)
+    for fields, why in (
+        ({"known": 8, "effect": 8, "slips": 1}, "failed for more than one reason"),
+        ({"known": 9, "effect": 8}, "could not be known before it came"),
+        ({}, "could not be known before it came"),
+    ):
+        place = tmp_path / f"results-{len(list(tmp_path.iterdir()))}"
+        runs = runs_in([experiment(place, row_of(SCENARIO, **fields), twin, **records)])
+        assert not runs.failures and any(why in told for told in runs.left_out)
+
+
+def test_a_run_without_a_scenario_was_lost_by_facts(tmp_path: Path) -> None:
+    row = row_of(
+        None, known=8, effect=9, causes=("vacant(Microwave-1)", "held_by(Plate-1, gripper)")
+    )
+    record = replace(watched(SCENARIO), scenario=None)
+    (failure,) = runs_in([experiment(tmp_path / "x", row, twin=record)]).failures
+    assert failure.cause[0].isupper() and "microwave" in failure.cause
 
 
 def test_answered_studies_are_not_made_again(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import http.client
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,8 +40,8 @@ def served(folder: Path) -> Iterator[StudyServer]:
 class Browser:
     """Keeps a cookie, follows what it is sent to."""
 
-    def __init__(self, server: StudyServer) -> None:
-        self.port = int(server.server_address[1])
+    def __init__(self, server: StudyServer | int) -> None:
+        self.port = server if isinstance(server, int) else int(server.server_address[1])
         self.cookie = ""
 
     def ask(
@@ -177,3 +179,26 @@ def test_one_process_serves_a_folder_at_a_port_that_is_free(tmp_path: Path) -> N
         with pytest.raises(InputError, match="nothing can listen"), serving(other, port=port):
             pass
     assert call(["study", "serve", str(tmp_path / "none")]) == 2
+
+
+@pytest.mark.slow
+def test_a_server_killed_between_answers_has_lost_none(tmp_path: Path) -> None:
+    study = make(tmp_path, 6, Design(1))
+    count = len(study.raters[0])
+    command = [sys.executable, "-m", "forestall", "study", "serve", str(tmp_path), "--port", "0"]
+    browser, done = None, 0
+    while done < count:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            port = int(process.stdout.readline().rstrip("/\n").rpartition(":")[2])
+            if browser is None:
+                browser = Browser(port)
+                browser.begin()
+            browser.port = port
+            for _ in range(3):
+                if done < count:
+                    assert browser.answer(done, "both")[0] == 200
+                    done += 1
+            process.kill()
+        (rater,) = read_raters(tmp_path, study)
+        assert len(rater.answers) == done

@@ -86,6 +86,11 @@ def serve(folder: Path, /, *, port: int = 8765, host: str = "127.0.0.1") -> int:
 
     with serving(folder, host, port) as server:
         print(server.address, flush=True)
+        if host not in ("127.0.0.1", "localhost"):
+            import socket
+
+            port = server.server_address[1]
+            print(f"on other devices: http://{socket.gethostname()}:{port}/", flush=True)
         try:
             server.serve_forever()
         except KeyboardInterrupt:

@@ -7,6 +7,7 @@ next writer takes away: the rater was never told that it was kept.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import time
@@ -128,10 +129,17 @@ class AnswerFile:
         self._append(answer)
 
     def _append(self, line: Start | Answer) -> None:
-        with naming(self.path), self.path.open("ab") as file:
-            file.write(json.dumps(asdict(line), ensure_ascii=False).encode() + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
+        """Write a whole line or none: what did not fit on a full disk is taken back."""
+        data = json.dumps(asdict(line), ensure_ascii=False).encode() + b"\n"
+        with naming(self.path), self.path.open("ab", buffering=0) as file:
+            before = file.tell()
+            try:
+                if file.write(data) != len(data):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                os.fsync(file.fileno())
+            except OSError:
+                os.truncate(file.fileno(), before)
+                raise
 
 
 def file_of(folder: Path, rater: int) -> Path:
