@@ -9,7 +9,7 @@ from pathlib import Path
 
 _ROOT = Path(__file__).parent
 
-PRESENTATION = ("cli", "report", "training", "experiments")
+PRESENTATION = ("cli", "report", "training", "experiments", "study")
 """Packages that show results or train models, and change no run."""
 
 JUDGING = ("calibration", "comparison", "detection", "diagnosis", "learning", "replanning")

@@ -24,6 +24,7 @@ from forestall.cli.parts import parts
 from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
 from forestall.cli.run import run
+from forestall.cli.study import study
 from forestall.errors import InputError
 
 app = App(
@@ -43,6 +44,7 @@ third_party.register(bench)
 app.command(encoder)
 app.command(plan)
 app.command(preconditions)
+app.command(study)
 
 
 def answer(arguments: Sequence[str]) -> int:

@@ -1,0 +1,148 @@
+"""The pages in headless Chromium, as raters use them, at the width of a desktop and of a phone."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from forestall.study.answers import read_raters
+from forestall.study.assigning import Design
+from forestall.study.reporting import report_of, report_page
+from forestall.study.simulated import simulate, write_simulated
+
+from .studies import LONG, NASTY, make
+from .test_reporting import TASTE
+from .test_serving import served
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+WIDTHS = {"desktop": (1400, 900), "phone": (400, 800)}
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """Debian's Chromium, driven by Playwright; skipped where one of them is missing."""
+    if CHROMIUM is None:
+        pytest.skip("there is no chromium on this machine")
+    driver = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with driver.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox"], timeout=240_000
+        )
+        yield browser
+        browser.close()
+
+
+def page_of(chromium: Any, where: str, **how: Any) -> Any:
+    width, height = WIDTHS[where]
+    context = chromium.new_context(viewport={"width": width, "height": height}, **how)
+    context.set_default_timeout(120_000)
+    return context.new_page()
+
+
+@pytest.mark.parametrize("where", list(WIDTHS))
+def test_a_study_is_answered_by_mouse_and_keys_killed_and_resumed(
+    tmp_path: Path, chromium: Any, where: str
+) -> None:
+    study = make(tmp_path, 4, Design(1), NASTY)
+    count, asked = len(study.raters[0]), []
+    page = page_of(chromium, where)
+    page.on("request", lambda request: asked.append(request.url))
+    with served(tmp_path) as server:
+        home = server.address
+        page.goto(home)
+        page.get_by_role("button", name="Begin").click()
+        assert page.get_by_role("heading", name="Which explanation is better?").is_visible()
+        page.get_by_label("A name or code").fill(LONG)
+        page.get_by_label("I have read this").check()
+        page.get_by_role("button", name="Begin").click()
+        reached(page, 1, count)
+        assert_fits(page)
+        page.get_by_role("button", name="A is better").click()
+        reached(page, 2, count)
+        page.keyboard.press("s")
+        reached(page, 3, count)
+        page.keyboard.press("Backspace")
+        reached(page, 2, count)
+        assert page.get_by_role("button", name="Both or cannot tell", pressed=True).is_visible()
+        page.keyboard.press("b")
+        reached(page, 3, count)
+        page.get_by_text("Pause").click()
+        assert page.get_by_role("link", name="your own link").is_visible()
+        assert_fits(page)
+        state = page.context.storage_state()
+        page.context.close()  # the rater goes away, the server is stopped
+    with served(tmp_path) as server:
+        page = page_of(chromium, where, storage_state=state)
+        page.goto(server.address)
+        for k in range(2, count):
+            reached(page, k + 1, count)
+            page.keyboard.press("a")
+        page.get_by_role("heading", name="Thank you").wait_for()
+        page.get_by_role("button", name="Next person").click()
+        page.get_by_role("button", name="Begin").wait_for()
+        page.context.close()
+    (rater,) = read_raters(tmp_path, study)
+    assert [a.choice for _, a in sorted(rater.answers.items())] == ["a", "b", *["a"] * (count - 2)]
+    assert all(a.seconds is not None for a in rater.answers.values())
+    assert all(url.startswith((home, "data:")) for url in asked)
+
+
+def test_without_javascript_it_works_as_well(tmp_path: Path, chromium: Any) -> None:
+    study = make(tmp_path, 2, Design(1))
+    page = page_of(chromium, "phone", java_script_enabled=False)
+    with served(tmp_path) as server:
+        page.goto(server.address)
+        page.get_by_label("I have read this").check()
+        page.get_by_role("button", name="Begin").click()
+        for _ in study.raters[0]:
+            page.get_by_role("button", name="Both or cannot tell").click()
+        page.get_by_role("heading", name="Thank you").wait_for()
+        page.context.close()
+    (rater,) = read_raters(tmp_path, study)
+    assert {a.choice for a in rater.answers.values()} == {"both"}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_that_a_screen_reader_would_miss(
+    tmp_path: Path, chromium: Any, scheme: str
+) -> None:
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright", reason="axe is missing"
+    ).Axe()
+    study = make(tmp_path, 1, Design(1))
+    page = page_of(chromium, "phone", color_scheme=scheme, bypass_csp=True)
+    with served(tmp_path) as server:
+        page.goto(server.address)
+        found = [axe.run(page)]
+        page.get_by_label("I have read this").check()
+        page.get_by_role("button", name="Begin").click()
+        reached(page, 1, len(study.raters[0]))
+        found.append(axe.run(page))
+        page.keyboard.press("a")
+        page.get_by_role("heading", name="Thank you").wait_for()
+        found.append(axe.run(page))
+    larger = make(tmp_path / "larger", 30, Design(8))
+    write_simulated(tmp_path / "larger", simulate(larger, TASTE, seed=1))
+    page.set_content(report_page(report_of(larger, tmp_path / "larger")))
+    found.append(axe.run(page))
+    page.context.close()
+    told = [f.generate_report() for f in found if f.violations_count]
+    assert not told and len(found) == 4
+
+
+def reached(page: Any, number: int, count: int) -> None:
+    """Wait until a comparison is shown and its keys work."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    expect(page).to_have_title(f"{number} of {count}", timeout=120_000)
+    page.wait_for_load_state()
+
+
+def assert_fits(page: Any) -> None:
+    """Nothing is wider than the window."""
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
