@@ -63,7 +63,12 @@ def test_a_run_is_recorded_and_repeats_without_a_network(tmp_path: Path) -> None
     written = write_record(tmp_path / "run", again)
     assert asked(read_record(written)) == asked(first)
     with pytest.raises(Exception, match="is there already"):
-        played(TASK, OCCUPIED, f"record:{file}", **{"llm.base_url": "http://127.0.0.1:9/v1"})
+        played(
+            TASK,
+            OCCUPIED,
+            f"record:{file}",
+            **{"llm.base_url": "http://127.0.0.1:9/v1", "llm.model": "m"},
+        )
     lines = file.read_text(encoding="utf-8").splitlines()
     file.write_text("\n".join(lines[:-1]) + "\n", encoding="utf-8")
     lacking = played(TASK, OCCUPIED, f"replay:{file}", **ALONE)

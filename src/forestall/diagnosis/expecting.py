@@ -27,7 +27,8 @@ from forestall.types.verdict import Precondition
 _MOST = 20
 """Steps that one question is about."""
 
-_Boundary = tuple[int, int, int]
+_Boundary = tuple[int, int, int, int]
+"""Steps tried, index in the plan, plans made, looks."""
 
 
 class ModelExpectations:
@@ -86,7 +87,7 @@ class ModelExpectations:
         return tuple(self._exchanges)
 
     def _at(self, context: BoundaryContext) -> None:
-        here = (len(context.executed), context.index, context.replans)
+        here = (len(context.executed), context.index, context.replans, context.looks)
         if here != self._here:
             self._here, self._exchanges = here, []
 
