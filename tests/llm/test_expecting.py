@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -11,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from forestall.assembly.configuration import run_config
+from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.expecting import keep, read_expected
+from forestall.assembly.make import prepare, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.comparison.expectations import LEAST_SHOWN, WEIGHT, Expected, beside
 from forestall.comparison.lacking import Knowledge
@@ -29,9 +31,11 @@ from forestall.llm.prompts import estimated_tokens
 from forestall.planning.ahead import foresee
 from forestall.reading.fields import Field
 from forestall.records.exchanges import exchanges_of
+from forestall.records.sentences import _judges
 from forestall.records.verdicts import verdict_from, verdict_json
 from forestall.report.page import page_html
 from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.episode import EpisodeRecord
 from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Plan
@@ -39,7 +43,11 @@ from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.types.verdict import Decision, Diagnosis, Verdict
+from llm.episodes import SEED, SYMBOLIC, memory
 from llm.scenes import Scripted
+from llm.server import Reply, Script, serving
+from llm.server import Scripted as Scripting
+from llm.server import said as said_over_http
 from llm.test_record import record
 
 BENCH = shipped("bench")
@@ -47,6 +55,12 @@ PLAN = Plan.parse(["pick(Bolt)", "insert(Bolt, BoltHole)", "pick(Cloth)"])
 INSERT = 1
 LIFTED = Literal("dirt", (BENCH.skills["insert"].parameters[1].name,), "clean")
 DIRTY = Literal.parse("dirt(BoltHole-1)=clean")
+
+
+@pytest.fixture(autouse=True)
+def no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    monkeypatch.setenv("NO_PROXY", "*")
 
 
 def scene(hole: str | None = "clean", bolt: str = "clean") -> SceneGraph:
@@ -123,10 +137,12 @@ def test_what_a_model_expects_is_an_alarm_that_says_whose_it_is() -> None:
     assert verdict.decision is Decision.REPLAN and verdict.lacking == (DIRTY,)
     assert verdict.score == pytest.approx(1 - WEIGHT) and verdict.references == 0
     assert "no demonstration, but the language model scripted expects it" in verdict.note
+    assert verdict.expected_by == "scripted"
+    assert _judges(verdict, ()).endswith("needs that the language model scripted expects")
     (asked,) = verdict.exchanges
     assert asked.purpose == "expecting" and not asked.problem and len(model.asked) == 1
     fine, _ = judged(at(scene()), CLEAN)
-    assert fine.decision is Decision.PROCEED and fine.judged
+    assert fine.decision is Decision.PROCEED and fine.judged and fine.expected_by == "scripted"
     assert fine.note == "no demonstration of it; it is as the language model scripted expects"
 
 
@@ -304,3 +320,51 @@ def test_behind_a_model_that_explains_both_questions_are_told() -> None:
     )
     assert found.must_change == (DIRTY,)
     assert [e.purpose for e in found.exchanges] == ["reasoning", "expecting"]
+
+
+def expecting(**facts: list[str]) -> Script:
+    """Says of the first step of a skill that these facts must hold."""
+
+    def script(body: dict[str, Any]) -> Reply:
+        text = body["messages"][1]["content"].partition("For these steps:")[2]
+        steps = [(int(n), s) for n, s in re.findall(r"^(\d+): (\w+)\(", text, re.MULTILINE)]
+        first = {s: n for n, s in reversed(steps)}
+        return said_over_http(said(**{f"step_{first[s]}": f for s, f in facts.items()}))
+
+    return script
+
+
+def without_demonstrations(expectations: str, script: Script) -> tuple[EpisodeRecord, Scripting]:
+    """A dirty plate, and demonstrations of another task alone."""
+    with serving(script) as server:
+        llm = {"name": "openai", "base_url": server.url}
+        named = {"detector": "preconditions", "expectations": expectations, "llm": llm}
+        given = Given.named(named).over(SYMBOLIC)
+        config = run_config("heat-potato", "plate-dirty", seed=SEED, given=given)
+        return run_episode(prepare(config), memory("water-plant")), server
+
+
+@pytest.mark.slow
+def test_a_whole_run_is_saved_by_what_a_model_expects() -> None:
+    script = expecting(put_on=["dirty(Plate)=clean"])
+    blind, server = without_demonstrations("none", script)
+    assert not blind.success and not server.asked
+    record, server = without_demonstrations("model", script)
+    assert record.success and len(server.asked) == 1
+    (alarm,) = (b for b in record.boundaries if b.diagnosis is not None)
+    assert alarm.verdict is not None and alarm.verdict.expected_by == "scripted"
+    assert "no demonstration shows it, but the language model scripted says" in alarm.sentence
+    assert alarm.sentence.endswith("needs that the language model scripted expects.")
+    assert "demonstrations" not in alarm.sentence
+    (asked,) = (e for b in record.boundaries for e in exchanges_of(b))
+    assert (asked.purpose, asked.model) == ("expecting", "scripted")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "fact", ["broken(Potato)=broken", "cooked(Potato)=cooked", "vacant(Potato)"]
+)
+def test_nonsense_that_is_expected_costs_no_run(fact: str) -> None:
+    blind, _ = without_demonstrations("none", expecting())
+    record, _ = without_demonstrations("model", expecting(pick_up=[fact]))
+    assert record.end is blind.end and record.trouble is None

@@ -180,7 +180,8 @@ class PreconditionDetector:
             asked = [v for v in false if 1.0 - weight(v) < self._config.threshold]
             facts = tuple(dict.fromkeys(v.literal for v in asked))
             note = _listed("violated", false)
-            return self._verdict(Decision.REPLAN, score, references, note, facts)
+            verdict = self._verdict(Decision.REPLAN, score, references, note, facts)
+            return replace(verdict, expected_by=max(false, key=weight).precondition.expected_by)
         look = context is not None and context.may_look
         unseen = [
             v
@@ -192,7 +193,12 @@ class PreconditionDetector:
             seen_not = [_listed("not observed", unseen)] if unseen else []
             note = "; ".join([*strange, *seen_not])
             return self._verdict(Decision.LOOK_AGAIN, score, references, note)
-        return self._verdict(Decision.PROCEED, score, references, _expected(mined))
+        models = dict.fromkeys(p.expected_by for p in mined if p.expected_by)
+        if not models:
+            return self._verdict(Decision.PROCEED, score, references)
+        by = " and ".join(models)
+        note = f"no demonstration of it; it is as the language model {by} expects"
+        return replace(self._verdict(Decision.PROCEED, score, references, note), expected_by=by)
 
     def _strange(self, observed: SceneGraph, subtask: Subtask) -> list[str]:
         """What is said of an argument in words that the domain lacks: it may matter or not."""
@@ -283,11 +289,3 @@ def _evidence(violation: Violation) -> str:
     if p.expected_by:
         return f"no demonstration, but the language model {p.expected_by} expects it{later}"
     return f"held in {p.support} of {p.total}{later}"
-
-
-def _expected(known: Sequence[Precondition]) -> str:
-    """That a language model expected some of what holds, "" where it did not."""
-    models = dict.fromkeys(p.expected_by for p in known if p.expected_by)
-    if not models:
-        return ""
-    return f"no demonstration of it; it is as the language model {' and '.join(models)} expects"

@@ -191,6 +191,7 @@ class Verdict:
     note: str = ""
     lacking: tuple[Literal, ...] = ()  # facts that should hold and do not, where it knows any
     p_value: float | None = None  # how rare a score this low is in good runs; None: not calibrated
+    expected_by: str = ""  # the language model that this rests on, and no demonstration
     exchanges: tuple[Exchange, ...] = ()  # with a language model, about what should hold here
 
     def __post_init__(self) -> None:
