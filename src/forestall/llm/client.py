@@ -159,8 +159,7 @@ class OpenAIModel:
             told = ", ".join(names[:_TOLD]) + (", ..." if len(names) > _TOLD else "")
             problem = f"it has {len(names)} models: {told}" if names else "it has no model"
         raise InputError(
-            f"which model of {address} is meant is not said, as in --llm.model NAME, and the "
-            f"endpoint does not have exactly one: {problem}"
+            f"say which model of {address} is meant, as in --llm.model NAME: {problem}"
         )
 
     def ask(self, request: Request, deadline: Deadline | None = None) -> Exchange:
