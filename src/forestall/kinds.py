@@ -11,6 +11,7 @@ from forestall.seams import (
     Captioner,
     DemonstrationStore,
     Detector,
+    Expectations,
     Eye,
     ImageTextEncoder,
     LanguageModel,
@@ -40,6 +41,7 @@ CAPTIONER = Kind[Captioner]("captioner", Captioner)
 STORE = Kind[DemonstrationStore]("store", DemonstrationStore)
 RETRIEVER = Kind[Retriever]("retriever", Retriever)
 DETECTOR = Kind[Detector]("detector", Detector)
+EXPECTATIONS = Kind[Expectations]("expectations", Expectations)
 LLM = Kind[LanguageModel]("llm", LanguageModel)
 REASONER = Kind[Reasoner]("reasoner", Reasoner)
 REPLANNER = Kind[Replanner]("replanner", Replanner)

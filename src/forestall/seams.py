@@ -6,7 +6,7 @@ the strategy, the strategy calls detector, reasoner, replanner; all see only thi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -34,7 +34,14 @@ from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal
-from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
+from forestall.types.verdict import (
+    Diagnosis,
+    PlanCheck,
+    Precondition,
+    Reference,
+    Replan,
+    Verdict,
+)
 from forestall.types.world import Working
 
 T = TypeVar("T")
@@ -402,6 +409,27 @@ class LanguageModel(Protocol):
 
     def ask(self, request: Request, deadline: Deadline | None = None) -> Exchange:
         """What came of a question, in time: an answer, or a problem that says why there is none."""
+
+
+class Expectations(Protocol):
+    """What should hold before subtasks that no demonstration shows.
+
+    The paper's third source of precondition states, beside demonstrations and what people say.
+    """
+
+    name: str
+
+    def over(
+        self,
+        mined: Sequence[Precondition],
+        subtask: Subtask,
+        context: BoundaryContext,
+        shown: Callable[[Subtask], bool],
+    ) -> tuple[Precondition, ...]:
+        """What was mined for a subtask, and what is expected; `shown`: has a demonstration."""
+
+    def asked(self, context: BoundaryContext) -> tuple[Exchange, ...]:
+        """What was asked of a language model at this boundary."""
 
 
 class Reasoner(Protocol):

@@ -39,8 +39,8 @@ ALONE = {"reasoner.otherwise": "none", "replanner.otherwise": "none"}
 """Nobody stands behind the model."""
 
 
-def good_script(record: EpisodeRecord) -> Script:
-    """What a good model answers, of a run in which the planner did it."""
+def good_answers(record: EpisodeRecord) -> dict[str, list[Any]]:
+    """What a good model answers in turn, of a run in which the planner did it; by purpose."""
     answers: dict[str, list[Any]] = {"reasoning": [], "replanning": []}
     for boundary in record.boundaries:
         diagnosis, replan = boundary.diagnosis, boundary.replan
@@ -48,6 +48,12 @@ def good_script(record: EpisodeRecord) -> Script:
             answers["reasoning"].append(explanation(diagnosis))
         if replan is not None and replan.plan is not None:
             answers["replanning"].append(steps(replan.plan))
+    return answers
+
+
+def good_script(record: EpisodeRecord) -> Script:
+    """The same as a script."""
+    answers = good_answers(record)
 
     def script(body: dict[str, Any]) -> Reply:
         left = answers[purpose_of(body)]

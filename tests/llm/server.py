@@ -44,6 +44,12 @@ def said(content: Any, *, refusal: str | None = None, ended: str = "stop", **usa
     return Reply(pieces=(json.dumps(body).encode(),))
 
 
+def having(*models: str) -> Reply:
+    """The list of an endpoint's models."""
+    listed = [{"id": m, "object": "model", "created": 0, "owned_by": "x"} for m in models]
+    return Reply(pieces=(json.dumps({"object": "list", "data": listed}).encode(),))
+
+
 def failed(status: int, message: str = "no", **headers: str) -> Reply:
     body = json.dumps({"error": {"message": message, "type": "error", "code": None}})
     named = tuple((k.replace("_", "-"), v) for k, v in headers.items())
@@ -61,6 +67,7 @@ class Scripted:
     url: str = ""
     asked: list[dict[str, Any]] = field(default_factory=list)
     keys: list[str] = field(default_factory=list)
+    models: Reply = field(default_factory=lambda: having("scripted"))
 
     def purpose(self, number: int = -1) -> str:
         return purpose_of(self.asked[number])
@@ -94,7 +101,15 @@ def serving(script: Script) -> Iterator[Scripted]:
                 return
             scripted.asked.append(body)
             scripted.keys.append(self.headers.get("Authorization", ""))
-            reply = scripted.script(body)
+            self.answer(scripted.script(body))
+
+        def do_GET(self) -> None:
+            if self.path != "/v1/models":
+                self.send_error(404)
+                return
+            self.answer(scripted.models)
+
+        def answer(self, reply: Reply) -> None:
             time.sleep(reply.wait_s)
             length = sum(map(len, reply.pieces)) if reply.promised is None else reply.promised
             self.send_response(reply.status)

@@ -9,7 +9,7 @@ from forestall.deadline import Deadline
 from forestall.errors import InputError
 from forestall.llm.client import ClientConfig, OpenAIModel
 from forestall.types.exchange import Exchange, Request
-from llm.server import Reply, Script, failed, in_turn, said, serving
+from llm.server import Reply, Script, failed, having, in_turn, said, serving
 
 REQUEST = Request(
     "reasoning", (("system", "be short"), ("user", "why?")), json.dumps({"type": "object"})
@@ -182,3 +182,34 @@ def test_without_a_key_and_an_address_there_is_nobody_to_ask(
     monkeypatch.delenv("OPENAI_API_KEY")
     with pytest.raises(InputError, match="OPENAI_API_KEY is not set"):
         OpenAIModel()
+
+
+def test_the_only_model_of_an_endpoint_is_taken_and_stands_in_what_is_recorded() -> None:
+    with serving(in_turn(said("{}"))) as server:
+        found = OpenAIModel(ClientConfig(base_url=server.url)).ask(REQUEST)
+    assert found.model == "scripted" == server.asked[0]["model"]
+    assert found.key == REQUEST.key("scripted")
+
+
+@pytest.mark.parametrize(
+    ("models", "why"),
+    [
+        (having("small", "large"), "it has 2 models: small, large"),
+        (having(), "it has no model"),
+        (having(*(f"m{k}" for k in range(40))), r"40 models: m0, .*m11, \.\.\."),
+        (failed(404), "the endpoint answered 404"),
+        (Reply(pieces=(b'{"models": []}',)), "its list of models cannot be read"),
+        (Reply(pieces=(b"x" * 300_000,)), "larger than"),
+        (Reply(wait_s=3), "no answer within 0.5 s|timed out"),
+    ],
+)
+def test_else_the_message_says_what_there_is(models: Reply, why: str) -> None:
+    with serving(in_turn(said("{}"))) as server:
+        server.models = models
+        limit_s = 0.5 if models.wait_s else 30.0
+        with pytest.raises(InputError, match=rf"--llm\.model NAME: .*({why})"):
+            OpenAIModel(ClientConfig(base_url=server.url, timeout_s=limit_s))
+
+
+def test_at_openai_the_papers_model_is_asked() -> None:
+    assert OpenAIModel(ClientConfig()).name == "gpt-4o"

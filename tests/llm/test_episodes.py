@@ -21,6 +21,18 @@ MAIN = (
 )  # fmt: skip
 """The scenarios of the main job."""
 
+ROBOFAIL = tuple(
+    f"robofail-{task}-{k}"
+    for task, of in (
+        ("boil-water", (1, 2, 3)), ("cook-egg", (1, 2, 3)), ("heat-potato", (1, 2, 3)),
+        ("make-coffee", (1, 2, 3)), ("make-salad", (1, 2, 3)), ("store-egg", (1, 2, 3)),
+        ("switch-devices", (1, 2, 5)), ("toast-bread", (1, 2, 3)), ("warm-water", (1, 2, 4)),
+        ("water-plant", (1, 2, 3)),
+    )
+    for k in of
+)  # fmt: skip
+"""Thirty, the first three of each task that the planner solves in the symbolic household."""
+
 
 @pytest.fixture(autouse=True)
 def no_key(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +44,7 @@ def asked(record: EpisodeRecord) -> list[Exchange]:
     return [e for b in record.boundaries for e in exchanges_of(b)]
 
 
-@pytest.mark.parametrize("name", MAIN)
+@pytest.mark.parametrize("name", (*MAIN, *ROBOFAIL))
 def test_the_model_path_alone_solves_what_the_planner_solves(name: str) -> None:
     task = load_scenario(name).task
     with good_model(task, name) as (server, by_planner):
@@ -63,7 +75,12 @@ def test_a_run_is_recorded_and_repeats_without_a_network(tmp_path: Path) -> None
     written = write_record(tmp_path / "run", again)
     assert asked(read_record(written)) == asked(first)
     with pytest.raises(Exception, match="is there already"):
-        played(TASK, OCCUPIED, f"record:{file}", **{"llm.base_url": "http://127.0.0.1:9/v1"})
+        played(
+            TASK,
+            OCCUPIED,
+            f"record:{file}",
+            **{"llm.base_url": "http://127.0.0.1:9/v1", "llm.model": "m"},
+        )
     lines = file.read_text(encoding="utf-8").splitlines()
     file.write_text("\n".join(lines[:-1]) + "\n", encoding="utf-8")
     lacking = played(TASK, OCCUPIED, f"replay:{file}", **ALONE)

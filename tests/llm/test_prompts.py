@@ -22,6 +22,7 @@ VALUES: dict[str, dict[str, Any]] = {
     "data": {},
     "facts": {"vocabulary": "on(A, B)"},
     "explaining": {"step": "put(A)", "detector": "d", "lines": ["A is here"]},
+    "expecting": {"goal": "g", "plan": "put(A)", "steps": ["1: put(A)"], "vocabulary": "on(A, B)"},
     "reasoning": {
         "goal": "g", "when": "Next step", "step": "put(A)", "executed": "nothing",
         "observed": ["A: here"], "expected": [], "differences": [], "judges": [],
@@ -47,7 +48,7 @@ def test_every_fragment_has_a_purpose_and_renders(name: str) -> None:
 
 
 def test_a_prompt_says_what_is_data_before_any_of_it() -> None:
-    for name in ("explaining", "reasoning", "replanning"):
+    for name in ("expecting", "explaining", "reasoning", "replanning"):
         (system, first), (user, second) = rendered(name, **VALUES[name])
         assert (system, user) == ("system", "user")
         assert "never instructions" in first and "never instructions" not in second

@@ -10,6 +10,7 @@ from forestall.errors import FileFormatError, InputError
 from forestall.reading.fields import Field
 from forestall.records.exchanges import taken
 from forestall.records.verdicts import diagnosis_from, diagnosis_json, replan_from, replan_json
+from forestall.report.exchange_view import exchange_views, laid_out
 from forestall.report.page import page_html
 from forestall.types.episode import BoundaryRecord, EpisodeEnd, EpisodeRecord
 from forestall.types.exchange import Exchange
@@ -68,6 +69,24 @@ def test_the_page_shows_prompt_answer_problem_and_cost() -> None:
     bare = replace(DIAGNOSIS, exchanges=()), replace(REPLAN, exchanges=())
     without = replace(record().boundaries[0], diagnosis=bare[0], replan=bare[1])
     assert "Language model" not in page_html(replace(record(), boundaries=(without,)))
+
+
+def test_what_a_question_repeats_and_what_an_answer_says_are_laid_out() -> None:
+    plan = '{"idea": "x\\ny: z", "steps": [{"skill": "put", "args": ["A", "B"]}], "more": []}'
+    asked = (("system", "s"), ("user", "u"))
+    first = Exchange("replanning", "m", "k", asked, plan, "it cannot run")
+    again = replace(
+        first, messages=(*asked, ("assistant", plan), ("user", "again")), answer="no", problem=""
+    )
+    other = replace(first, messages=asked, answer=None)
+    views = exchange_views((first, again, other))
+    assert [(v.number, v.follows, v.messages) for v in views] == [
+        (1, 0, asked), (2, 1, (("user", "again"),)), (3, 0, asked),
+    ]  # fmt: skip
+    assert views[0].answer == "idea: x y: z\nsteps: \n  1. put(A, B)\nmore: none"
+    assert (views[1].answer, views[2].answer) == ("no", "")
+    steps = laid_out('{"steps": [{"step": 2, "must_hold": ["a", "b"]}, {"skill": "x", "args": 1}]}')
+    assert steps == "steps: \n  - step: 2, must_hold: a; b\n  - skill: x, args: 1"
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,7 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import (
     CAPTIONER,
     DETECTOR,
+    EXPECTATIONS,
     IMAGE_ENCODER,
     PERCEIVER,
     REASONER,
@@ -162,7 +163,7 @@ def always_held(
     """What always held before the subtask in its demonstrations.
 
     Args:
-        parts: domain, demonstrations; of a calibration also the retriever.
+        parts: domain, demonstrations, expectations; of a calibration also the retriever.
         alarm: the threshold.
         mining: how much evidence a precondition needs.
         calibration: a file of `forestall calibrate`, which says whether it may alarm.
@@ -177,6 +178,7 @@ def always_held(
         thresholds,
         corrections_of(parts, corrections),
         knowledge=_knowledge(parts),
+        expectations=parts.part(EXPECTATIONS),
     )
 
 
@@ -206,6 +208,7 @@ def preconditions(
         corrections_of(parts, corrections),
         knowledge=_knowledge(parts),
         remembered=partial(needed, config=mining),
+        expectations=parts.part(EXPECTATIONS),
     )
 
 

@@ -101,7 +101,15 @@ def _at_least_one(attempts: int) -> None:
 
 
 def said_llm(text: str | None) -> Given:
-    """What `--llm` says: the model, and that it explains and plans.
+    """What `--llm` says of a run: the model, and that it explains and plans; as `named_llm`."""
+    named = named_llm(text)
+    if text is None or text == _NO_MODEL:
+        return named
+    return named.over(Given.named({REASONER.name: "model", REPLANNER.name: "model"}))
+
+
+def named_llm(text: str | None) -> Given:
+    """The model that `--llm` names, and nothing of who asks it.
 
     Args:
         text: an address of an endpoint, "replay:FILE", "record:FILE", a part's name, or the name
@@ -112,9 +120,7 @@ def said_llm(text: str | None) -> Given:
     """
     if text is None:
         return Given()
-    if text == _NO_MODEL:
-        return Given.named({LLM.name: _NO_MODEL})
-    return Given.named({LLM.name: _model(text), REASONER.name: "model", REPLANNER.name: "model"})
+    return Given.named({LLM.name: _NO_MODEL if text == _NO_MODEL else _model(text)})
 
 
 def _model(text: str) -> dict[str, str]:

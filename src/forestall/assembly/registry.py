@@ -124,6 +124,14 @@ TABLES: Mapping[str, Table] = {
             },
         ),
         Table(
+            kinds.EXPECTATIONS,
+            "none",
+            {
+                "model": "forestall.assembly.expecting:model",
+                "none": "forestall.comparison.expectations:NoExpectations",
+            },
+        ),
+        Table(
             kinds.LLM,
             "none",
             {name: f"{_LANGUAGE}:{name}" for name in ("none", "openai", "replay")},

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from forestall.cli.flags import ComparingFlags
+from forestall.cli.flags import AblationFlags, ComparingFlags
 
 if TYPE_CHECKING:
     from forestall.experiments.cost import Cost
@@ -75,6 +75,7 @@ class Options:
 
 DEFAULTS = Options()
 PARTS = ComparingFlags()
+ABLATED = AblationFlags()
 
 
 def proactive(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
@@ -87,8 +88,11 @@ def detection(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> 
     return _experiment("detection", options, parts)
 
 
-def ablation(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
-    """The paper's Table 2: the score without its parts, replanning without reasoning."""
+def ablation(*, options: Options = DEFAULTS, parts: AblationFlags = ABLATED) -> int:
+    """The paper's Table 2: the score without its parts, replanning without reasoning.
+
+    With --llm also reasoning by a language model, and by one that plans, too.
+    """
     return _experiment("ablation", options, parts)
 
 
@@ -134,6 +138,7 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
     from forestall.experiments.results import present
     from forestall.experiments.runs import PART, Choice, Settings
 
+    settings = Settings(parts.given(), pages=options.pages)
     experiment = Experiment(
         Choice(
             name,
@@ -146,11 +151,12 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
             PART if options.part is None else options.part,
             options.quick,
             options.demonstrations,
+            models=name == "ablation" and settings.asks,
         ),
         options.jobs if options.jobs is not None else os.cpu_count() or 1,
         options.engine,
         options.address,
-        Settings(parts.given(), pages=options.pages),
+        settings,
     )
     out = options.out or Path("runs") / f"{name}-{options.split}"
     quiet = options.quiet or options.as_json

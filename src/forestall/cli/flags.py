@@ -120,6 +120,26 @@ class RunFlags(ComparingFlags):
         return given.over(said_llm(self.llm)), run
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class AblationFlags(ComparingFlags):
+    """Who explains in some of the runs, besides.
+
+    Args:
+        llm: a language model that reasons in runs of their own, beside templates and nobody: an
+            endpoint's address, a model's name, or replay:FILE.
+    """
+
+    llm: str | None = None
+
+    def read(self) -> tuple[Given, dict[str, Any]]:
+        """See above; only some runs ask the model."""
+        from forestall.assembly.language import named_llm
+
+        given, run = super().read()
+        return given.over(named_llm(self.llm)), run
+
+
 def spelt(arguments: Iterable[str]) -> Iterator[str]:
     """Arguments with `--kind.option value` written as `--set kind.option=value`."""
     waiting: str | None = None

@@ -15,12 +15,14 @@ from functools import partial
 
 from forestall.calibration.fitted import JudgeThresholds
 from forestall.comparison.corrections import Corrections
+from forestall.comparison.expectations import NoExpectations, shown
 from forestall.comparison.lacking import Knowledge, lacking, step_of
 from forestall.comparison.preconditions import MiningConfig, mine, needed, violations
 from forestall.comparison.relevance import counts
 from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
 from forestall.domain.model import Domain
 from forestall.errors import InputError
+from forestall.seams import Expectations
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
@@ -85,6 +87,8 @@ class PreconditionDetector:
         corrections: what a person says of what is mined.
         knowledge: what is known of the whole memory and of the plan; None: only the references of
             a boundary are.
+        expectations: what should hold before subtasks that no demonstration in the whole memory
+            shows.
     """
 
     name = "preconditions"
@@ -98,7 +102,9 @@ class PreconditionDetector:
         corrections: Corrections | None = None,
         *,
         knowledge: Knowledge | None = None,
+        expectations: Expectations | None = None,
     ) -> None:
+        self._expectations = expectations or NoExpectations()
         self._domain = domain
         self._knowledge = knowledge
         self._mining = mining or MiningConfig()
@@ -122,6 +128,8 @@ class PreconditionDetector:
     ) -> Verdict:
         """See which mined preconditions hold on the scoped graph of a boundary."""
         verdict = self._judge(observed, references, context)
+        if context is not None:
+            verdict = replace(verdict, exchanges=self._expectations.asked(context))
         if self._thresholds is None or verdict.score is None:
             return verdict
         fits = 0.0 if verdict.decision is Decision.REPLAN else 1.0
@@ -172,14 +180,25 @@ class PreconditionDetector:
             asked = [v for v in false if 1.0 - weight(v) < self._config.threshold]
             facts = tuple(dict.fromkeys(v.literal for v in asked))
             note = _listed("violated", false)
-            return self._verdict(Decision.REPLAN, score, references, note, facts)
-        unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
+            verdict = self._verdict(Decision.REPLAN, score, references, note, facts)
+            return replace(verdict, expected_by=max(false, key=weight).precondition.expected_by)
+        look = context is not None and context.may_look
+        unseen = [
+            v
+            for v in found
+            if v.truth is Truth.UNOBSERVED and (look or not v.precondition.expected_by)
+        ]
         strange = self._strange(observed, subtask)
         if unseen or strange:
             seen_not = [_listed("not observed", unseen)] if unseen else []
             note = "; ".join([*strange, *seen_not])
             return self._verdict(Decision.LOOK_AGAIN, score, references, note)
-        return self._verdict(Decision.PROCEED, score, references)
+        models = dict.fromkeys(p.expected_by for p in mined if p.expected_by)
+        if not models:
+            return self._verdict(Decision.PROCEED, score, references)
+        by = " and ".join(models)
+        note = f"no demonstration of it; it is as the language model {by} expects"
+        return replace(self._verdict(Decision.PROCEED, score, references, note), expected_by=by)
 
     def _strange(self, observed: SceneGraph, subtask: Subtask) -> list[str]:
         """What is said of an argument in words that the domain lacks: it may matter or not."""
@@ -210,12 +229,9 @@ class PreconditionDetector:
         """What always held in the whole memory; mined once for the same kinds of arguments."""
         memory, task = knowledge.counts(), context.task.name
         key = (subtask.skill, tuple(memory.kinds(subtask).values()), task, step, memory.runs)
-        return self._once(
-            key,
-            lambda: self._corrected(
-                needed(memory, subtask, task, step, self._mining), subtask, task
-            ),
-        )
+        mined = self._once(key, lambda: needed(memory, subtask, task, step, self._mining))
+        known = self._expectations.over(mined, subtask, context, partial(shown, memory))
+        return self._corrected(known, subtask, task)
 
     def _corrected(
         self, mined: tuple[Precondition, ...], subtask: Subtask, task: str
@@ -270,4 +286,6 @@ def _evidence(violation: Violation) -> str:
     if p.by_hand:
         return "a correction by hand"
     later = f", before {p.skill}, {violation.ahead} steps ahead" if violation.ahead else ""
+    if p.expected_by:
+        return f"no demonstration, but the language model {p.expected_by} expects it{later}"
     return f"held in {p.support} of {p.total}{later}"

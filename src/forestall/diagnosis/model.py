@@ -122,7 +122,7 @@ class ModelReasoner:
             return Diagnosis(cause, (), producer=self.name, exchanges=tuple(exchanges))
         found = self._otherwise.diagnose(context, verdict)
         producer = f"{found.producer}, since the language model gave no explanation"
-        return replace(found, producer=producer, exchanges=tuple(exchanges))
+        return replace(found, producer=producer, exchanges=(*exchanges, *found.exchanges))
 
 
 def pictures(observation: Observation | None) -> tuple[bytes, ...]:

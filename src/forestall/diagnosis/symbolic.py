@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 from forestall.comparison.corrections import Corrections
+from forestall.comparison.expectations import NoExpectations, shown
 from forestall.comparison.lacking import Knowledge, lacking, step_of
 from forestall.comparison.needs import Needs
 from forestall.comparison.preconditions import needed
@@ -20,6 +22,7 @@ from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
 from forestall.records.sentences import in_demonstrations
+from forestall.seams import Expectations
 from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
@@ -68,6 +71,7 @@ class SymbolicReasoner:
         knowledge: what is known of the whole memory and of the plan; None: only the references of
             a boundary are.
         remembered: mines from that memory.
+        expectations: what should hold before subtasks that no demonstration in it shows.
     """
 
     name = "preconditions"
@@ -81,7 +85,9 @@ class SymbolicReasoner:
         *,
         knowledge: Knowledge | None = None,
         remembered: Remembered = needed,
+        expectations: Expectations | None = None,
     ) -> None:
+        self._expectations = expectations or NoExpectations()
         self.mine = mine
         self.violations = violations
         self.domain = domain
@@ -90,6 +96,11 @@ class SymbolicReasoner:
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         """Name the violated facts about the subtask's arguments; unobserved ones do not count."""
+        return replace(
+            self._diagnosis(context, verdict), exchanges=self._expectations.asked(context)
+        )
+
+    def _diagnosis(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         subtask, graph, when = context.subtask, context.graph, context.when
         knows = self._knowledge is not None and when is When.BEFORE
         if not context.references and not knows:
@@ -105,7 +116,8 @@ class SymbolicReasoner:
         domain = self.domain
         broken.sort(key=lambda v: _order(v, domain))
         failed = {v.literal for v in broken}
-        ground = (p.literal.bind(domain.bound(subtask)) for p in preconditions)
+        shown_to = [p for p in preconditions if not p.expected_by]
+        ground = (p.literal.bind(domain.bound(subtask)) for p in shown_to)
         stay = {x for x in ground if x not in failed and truth(graph, x, domain) is Truth.TRUE}
         planned = context.plan.subtasks[context.index]
         later = context.remaining()
@@ -121,7 +133,7 @@ class SymbolicReasoner:
             must_stay=tuple(sorted(stay)),
             culprits=tuple(culprits),
             producer=self.name,
-            support=(broken[0].precondition.support, broken[0].precondition.total),
+            support=_support(broken[0].precondition),
         )
 
     def _shown(
@@ -146,7 +158,9 @@ class SymbolicReasoner:
         memory, task = self._knowledge.counts(), context.task.name
 
         def mined(subtask: Subtask, step: int | None) -> Sequence[Precondition]:
-            return self._corrected(self._remembered(memory, subtask, task, step), subtask, task)
+            found = self._remembered(memory, subtask, task, step)
+            known = self._expectations.over(found, subtask, context, partial(shown, memory))
+            return self._corrected(known, subtask, task)
 
         step = step_of(context.references, task, context.done)
         whole = replace(context, scoped=context.graph)
@@ -162,6 +176,12 @@ class SymbolicReasoner:
 
     def _nothing(self, cause: str) -> Diagnosis:
         return Diagnosis(cause=cause, must_change=(), producer=self.name)
+
+
+def _support(precondition: Precondition) -> tuple[int, int] | None:
+    """In how many demonstrations it held, None where a language model says so."""
+    p = precondition
+    return None if p.expected_by else (p.support, p.total)
 
 
 def _order(violation: Violation, domain: Domain) -> tuple[object, ...]:
@@ -197,7 +217,10 @@ def explain(
     """One sentence: what is the case, and what it was in the demonstrations."""
     literal, p, roles = violation.literal, violation.precondition, domain.roles
     if p.by_hand:
-        return _by_hand(literal, graph, subtask, domain)
+        return _said(literal, graph, subtask, domain, "a person says")
+    if p.expected_by:
+        who = f"no demonstration shows it, but the language model {p.expected_by} says"
+        return _said(literal, graph, subtask, domain, who)
     when = in_demonstrations(p.support, p.total)
     name = literal.args[0] if literal.args else ""
     predicate, yes = literal.predicate, literal.value == "true"
@@ -229,9 +252,9 @@ def explain(
     return f"{name} is not {relation}; it was {when}"
 
 
-def _by_hand(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain) -> str:
-    """What a person says must hold, and does not."""
-    name, said = literal.args[0] if literal.args else "", "a person says that it must be"
+def _said(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain, says: str) -> str:
+    """What a person or a language model says must hold, and does not."""
+    name, said = literal.args[0] if literal.args else "", f"{says} that it must be"
     if literal.is_state:
         node = graph.get(name)
         now = None if node is None else node.state(literal.predicate)

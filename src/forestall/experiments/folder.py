@@ -260,6 +260,7 @@ class ResultsFolder(Generic[R]):
                 c.part,
                 c.quick,
                 c.demonstrations,
+                c.models,
             )
             for c in (call.choice for call in self._calls(ExperimentCall))
         ]

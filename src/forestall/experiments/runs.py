@@ -18,10 +18,19 @@ from forestall.assembly.configuration import Given, choices, domain_of, said_dom
 from forestall.assembly.registry import find
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.kinds import DETECTOR, STRATEGY
+from forestall.kinds import DETECTOR, LLM, STRATEGY
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, UNDISTURBED, Case, cases
 from forestall.statistics.judges import THRESHOLDS
-from forestall.statistics.rows import EXACT, HONEST, KIND, PLAIN, Setup
+from forestall.statistics.rows import (
+    EXACT,
+    HONEST,
+    KIND,
+    MODEL,
+    MODEL_PLANS,
+    PLAIN,
+    TEMPLATES,
+    Setup,
+)
 from forestall.statistics.watches import PAPER_SET
 from forestall.tasks.variation import MOST
 
@@ -110,6 +119,11 @@ class Settings:
                 raise InputError(f"an experiment chooses the {kind} of each run by itself")
         return tuple(part for part in choices(self.given) if part.kind not in OWN)
 
+    @property
+    def asks(self) -> bool:
+        """Whether a language model was named."""
+        return self.given.chosen(LLM.name).name != "none"
+
     def domain(self) -> Domain | None:
         """The domain that every task is read in, None for their own.
 
@@ -145,6 +159,7 @@ class Run:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+    reasoning: str = TEMPLATES
 
     @property
     def setup(self) -> Setup:
@@ -186,6 +201,7 @@ class Choice:
         quick: a tenth of that, and of the strategies that step in one case of each set has a third.
         demonstrations: of each task in the honest household, each another way to do it; by default
             `DEMONSTRATIONS`, `QUICK_DEMONSTRATIONS` in a quick experiment.
+        models: whether a language model reasons in an ablation, too.
     """
 
     experiment: str
@@ -198,6 +214,7 @@ class Choice:
     part: float = PART
     quick: bool = False
     demonstrations: int | None = None
+    models: bool = False
 
     @property
     def ways(self) -> int:
@@ -269,6 +286,8 @@ def _in(profile: str, choice: Choice) -> Iterator[Run]:
         for case in robofail if choice.experiment == "ablation" else _some(robofail, ABLATED):
             yield run(case, "proactive")
             yield from (run(case, "proactive", without=p) for p in ("reasoning", "validation"))
+            asked = (MODEL, MODEL_PLANS) if choice.models else ()
+            yield from (run(case, "proactive", reasoning=r) for r in asked)
 
 
 def _stepping_in(case: Case, run: Callable[..., Run]) -> Iterator[Run]:

@@ -67,6 +67,7 @@ class Chosen(_Model):
     part: float
     quick: bool
     demonstrations: int | None
+    models: bool = False
 
 
 class Call(_Model):

@@ -20,10 +20,19 @@ from forestall.errors import ForestallError
 from forestall.experiments.runs import MODELS, Run, Settings
 from forestall.kinds import WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
+from forestall.records.exchanges import exchanges_of
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
 from forestall.seams import WorldPart
-from forestall.statistics.rows import EXACT, KIND, EpisodeRow, Judged
+from forestall.statistics.rows import (
+    EXACT,
+    KIND,
+    MODEL,
+    MODEL_PLANS,
+    TEMPLATES,
+    EpisodeRow,
+    Judged,
+)
 from forestall.statistics.watches import WATCH
 from forestall.tasks.causes import causes
 from forestall.tasks.faults import knowable
@@ -47,6 +56,15 @@ UNLIMITED = {
     "max_unchanged": 0,
 }
 """An experiment goes on as the paper does, however often something goes wrong, and counts it."""
+
+_ALONE = {"name": "model", "otherwise": "none"}
+
+REASONING: dict[str, dict[str, Any]] = {
+    TEMPLATES: {},
+    MODEL: {"reasoner": _ALONE},
+    MODEL_PLANS: {"reasoner": _ALONE, "replanner": _ALONE},
+}
+"""What is said of the parts so that somebody explains; a model has nobody behind it."""
 
 _BROKEN = (TroubleKind.INTERNAL, TroubleKind.FAILED, TroubleKind.WORLD)
 """After these nothing was measured; what was late, not believed or too often was held."""
@@ -85,7 +103,9 @@ def config_of(run: Run, settings: Settings) -> RunConfig:
         seed=case.seed,
         without=run.without,
         keep_observations=False,
-        given=_household(run.profile, settings).over(Given.named({"limit": UNLIMITED})),
+        given=Given.named(REASONING[run.reasoning])
+        .over(_household(run.profile, settings))
+        .over(Given.named({"limit": UNLIMITED})),
         strategy=strategy,
         detector={"name": run.detector, "threshold": run.threshold},
     )
@@ -222,7 +242,7 @@ def _row(run: Run, prepared: Prepared, record: EpisodeRecord, trace: TruthTrace)
             b.replan is not None and b.replan.outcome is not ReplanOutcome.NOTHING_TO_CHANGE
             for b in record.boundaries
         ),
-        model_calls=0,
+        model_calls=sum(len(exchanges_of(b)) for b in record.boundaries),
         simulated_s=record.simulated_s,
         compute_s=dict(record.compute_s),
         reasoning_s=reasoning_s(record.compute_s),
@@ -275,6 +295,7 @@ def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
         "profile": run.profile,
         "model": run.model,
         "demonstrations": run.demonstrations,
+        "reasoning": run.reasoning,
         "known": moments[0] if told else None,
         "effect": moments[1] if told else None,
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -27,6 +27,10 @@ T = TypeVar("T")
 
 MOST_FACTS, MOST_STEPS = 12, 60
 _LONGEST = 400
+
+Said = dict[int, tuple[tuple[Literal, ...], str]]
+"""Number of a step → facts that should hold before it, over its skill's parameters; and why."""
+
 _FENCE = re.compile(r"^\s*```(?:json)?\s*\n(.*?)\n?\s*```\s*$", re.DOTALL)
 
 
@@ -70,6 +74,16 @@ def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
         args=_list({"type": "string", "enum": sorted(things)}),
     )
     return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)), sort_keys=True)
+
+
+def expectations_schema(numbers: Collection[int]) -> str:
+    """The schema of what should hold before some steps of a plan, by their numbers."""
+    step = _object(
+        step={"type": "integer", "enum": sorted(numbers)},
+        must_hold=_list(_text("a fact")),
+        why=_text("one sentence"),
+    )
+    return json.dumps(_object(steps=_list(step)), sort_keys=True)
 
 
 def explanation_schema() -> str:
@@ -183,6 +197,73 @@ def known_fact(text: str, graph: SceneGraph, domain: Domain, wanted: Truth) -> L
         raise Unfit("it holds already")
     if wanted is Truth.TRUE and now is not Truth.TRUE:
         raise Unfit("it is not seen to hold")
+    return fact
+
+
+def expectations(
+    answer: str, asked: Mapping[int, Subtask], domain: Domain
+) -> tuple[Said, tuple[str, ...]]:
+    """Read what should hold before steps: number → facts over the skill's parameters, and why.
+
+    Facts that mean nothing are left out, and so are steps that nobody asked about; the second
+    value says which and why.
+
+    Raises:
+        Unfit: the answer cannot be read.
+    """
+    dropped: list[str] = []
+
+    def read(field: Field) -> Said:
+        found: Said = {}
+        for entry in field["steps"].at_most(MOST_STEPS, lambda item: item):
+            number, why = entry["step"].whole(), line(entry["why"].text())
+            texts = entry["must_hold"].at_most(MOST_FACTS, Field.text)
+            if number not in asked or number in found:
+                dropped.extend(f"{t!r}: nobody asked about step {number}" for t in map(line, texts))
+                continue
+            facts: dict[tuple[str, tuple[str, ...]], Literal] = {}
+            for text in texts:
+                try:
+                    fact = expected_fact(text, asked[number], domain)
+                    if facts.setdefault((fact.predicate, fact.args), fact) != fact:
+                        raise Unfit("it contradicts another one")
+                except ForestallError as error:
+                    dropped.append(line(f"{text!r}: {error}"))
+            found[number] = (tuple(facts.values()), why)
+        return found
+
+    return _read(answer, read), tuple(dropped)
+
+
+def expected_fact(text: str, step: Subtask, domain: Domain) -> Literal:
+    """A fact about a step's own things as one over its skill's parameters.
+
+    Raises:
+        ForestallError: it means nothing in the domain, is about something else, or no plan brings
+            it about.
+    """
+    parsed = Literal.parse(text)
+    bound, names = domain.bound(step), dict[str, list[str]]()
+    for parameter, name in bound.items():
+        names.setdefault(domain.canonical(name), []).append(parameter)
+    args = []
+    for given in parsed.args:
+        meant = domain.canonical(given)
+        known = given in bound or meant in domain.robot.hands
+        parameters = [given] if known else names.get(meant, [])
+        if len(parameters) != 1:
+            why = f"is no thing of {step}" if not parameters else f"stands twice in {step}"
+            raise Unfit(f"{given} {why}")
+        args.append(parameters[0])
+    fact = Literal(parsed.predicate, tuple(args), parsed.value)
+    check_literal(domain, "the answer", fact)
+    if fact.predicate not in changeable(domain):
+        raise Unfit(f"no plan brings about {fact.predicate}")
+    kinds = [domain.find(bound[a]) for a in args if a in bound]
+    if fact.predicate in domain.attributes and not any(
+        kind is not None and fact.predicate in kind.attributes for kind in kinds
+    ):
+        raise Unfit(f"{fact.predicate} is nothing that such a thing has")
     return fact
 
 

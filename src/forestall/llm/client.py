@@ -13,9 +13,10 @@ import os
 import threading
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from email.utils import parsedate_to_datetime
+from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -25,6 +26,9 @@ from forestall.reading.documents import parse_json
 from forestall.reading.fields import Field
 from forestall.types.exchange import Exchange, Request
 
+OPENAI_MODEL = "gpt-4o"
+"""The paper's."""
+
 MOST_BYTES = 256 * 1024
 """How large the body of an answer may be; ours are a few kilobytes."""
 
@@ -32,6 +36,8 @@ _AGAIN = (408, 409, 429)
 _FIRST_WAIT_S, _MOST_WAIT_S, _POLL_S = 0.5, 8.0, 0.05
 _LONGEST = 300
 """Characters of somebody else's message."""
+_TOLD = 12
+"""How many models a message names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +45,7 @@ class ClientConfig:
     """How an endpoint is asked.
 
     Args:
-        model: its name there.
+        model: its name there; by default gpt-4o at OpenAI, elsewhere the only one that there is.
         base_url: of the endpoint, up to and with "/v1"; OpenAI's own by default.
         key_variable: the environment variable that holds the key.
         timeout_s: of one question, every further try and every pause between them included.
@@ -55,7 +61,7 @@ class ClientConfig:
         InputError: a number that cannot be, or an address that is none or holds a secret.
     """
 
-    model: str = "gpt-4o"
+    model: str | None = None
     base_url: str | None = None
     key_variable: str = "OPENAI_API_KEY"
     timeout_s: float = 20.0
@@ -110,12 +116,12 @@ class OpenAIModel:
         config: which endpoint, and how it is asked.
 
     Raises:
-        InputError: the package is not installed, or there is no key for OpenAI's own endpoint.
+        InputError: the package is not installed, there is no key for OpenAI's own endpoint, or no
+            model is named and the endpoint does not have exactly one.
     """
 
     def __init__(self, config: ClientConfig | None = None) -> None:
         self._config = config or ClientConfig()
-        self.name = self._config.model
         self._key = os.environ.get(self._config.key_variable, "")
         if not self._key and self._config.base_url is None:
             raise InputError(
@@ -135,8 +141,26 @@ class OpenAIModel:
         )
         self._create: Any = client.chat.completions.with_streaming_response.create
         weakref.finalize(self, client.close)
+        self.name = self._config.model or self._only_model(client)
         self._calls = self._tokens = 0
         self._lock = threading.Lock()
+
+    def _only_model(self, client: Any) -> str:
+        """The name of the model that an endpoint has, where nobody names one."""
+        address = self._config.base_url
+        if address is None:
+            return OPENAI_MODEL
+        list_models = client.models.with_streaming_response.list
+        got = self._once(list_models, Deadline(self._config.timeout_s))
+        names, problem = ((), got.problem) if got.problem else _models(got.body)
+        if len(names) == 1:
+            return names[0]
+        if not problem:
+            told = ", ".join(names[:_TOLD]) + (", ..." if len(names) > _TOLD else "")
+            problem = f"it has {len(names)} models: {told}" if names else "it has no model"
+        raise InputError(
+            f"say which model of {address} is meant, as in --llm.model NAME: {problem}"
+        )
 
     def ask(self, request: Request, deadline: Deadline | None = None) -> Exchange:
         """See the Protocol."""
@@ -152,7 +176,7 @@ class OpenAIModel:
                 got = _Got(problem=got.problem if tries else "there was no time left to ask")
                 break
             tries += 1
-            got = self._once(request, limit)
+            got = self._once(partial(self._create, **self._body(request)), limit)
             if not got.again or tries > self._config.retries:
                 break
             wait_s = pause_s if got.wait_s is None else got.wait_s
@@ -176,11 +200,11 @@ class OpenAIModel:
             self._calls += 1
         return ""
 
-    def _once(self, request: Request, limit: Deadline) -> _Got:
+    def _once(self, call: Callable[..., Any], limit: Deadline) -> _Got:
         """One try, on a thread of its own: neither a name server nor a trickle takes longer."""
         box: list[_Got] = []
         thread = threading.Thread(
-            target=lambda: box.append(self._sent(request, limit)), name="language model",
+            target=lambda: box.append(self._sent(call, limit)), name="language model",
             daemon=True,
         )  # fmt: skip
         thread.start()
@@ -190,11 +214,11 @@ class OpenAIModel:
             return box[0]
         return _Got(problem=f"no answer within {self._config.timeout_s:g} s", again=True)
 
-    def _sent(self, request: Request, limit: Deadline) -> _Got:
+    def _sent(self, call: Callable[..., Any], limit: Deadline) -> _Got:
         sdk = self._sdk
         try:
             left_s = max(limit.left(), 0.001)
-            with self._create(**self._body(request), timeout=left_s) as response:
+            with call(timeout=left_s) as response:
                 body = bytearray()
                 for piece in response.iter_bytes():
                     body += piece
@@ -222,7 +246,7 @@ class OpenAIModel:
                 shown = {"type": "image_url", "image_url": {"url": _data_url(image)}}
                 first["content"].append(shown)
         body: dict[str, Any] = {
-            "model": self._config.model, "messages": messages, "max_tokens": request.max_tokens,
+            "model": self.name, "messages": messages, "max_tokens": request.max_tokens,
         }  # fmt: skip
         if self._config.temperature is not None:
             body |= dict(temperature=self._config.temperature)
@@ -300,6 +324,15 @@ def _read(body: bytes) -> tuple[str | None, str, int | None, int | None]:
     if ended == "content_filter":
         return content, "the endpoint's filter stopped the answer", sent, came
     return content, "", sent, came
+
+
+def _models(body: bytes) -> tuple[tuple[str, ...], str]:
+    """The names of an endpoint's models, and why they cannot be read."""
+    try:
+        listed = Field(parse_json(body.decode("utf-8")))["data"].items()
+        return tuple(dict.fromkeys(m["id"].text() for m in listed)), ""
+    except (ForestallError, ValueError) as error:
+        return (), f"its list of models cannot be read: {' '.join(str(error).split())[:_LONGEST]}"
 
 
 def _count(usage: Any, name: str) -> int | None:

@@ -118,7 +118,11 @@ def vocabulary(graph: SceneGraph, domain: Domain) -> str:
 
     "torque=loose|tight, on(A, B), ready(A)".
     """
-    kinds = {n.category for n in graph.nodes}
+    return vocabulary_of({n.category for n in graph.nodes}, domain)
+
+
+def vocabulary_of(kinds: Collection[str], domain: Domain) -> str:
+    """The same about things of some kinds."""
     attributes = [
         a for a in domain.attributes
         if any(a in domain[k].attributes for k in kinds if domain.find(k) is not None)

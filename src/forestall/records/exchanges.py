@@ -86,9 +86,8 @@ class Taken:
 
 def exchanges_of(boundary: BoundaryRecord) -> tuple[Exchange, ...]:
     """Every question at a boundary, in its order."""
-    asked = () if boundary.diagnosis is None else boundary.diagnosis.exchanges
-    more = () if boundary.replan is None else boundary.replan.exchanges
-    return (*asked, *more)
+    told = (boundary.verdict, *boundary.watched, boundary.diagnosis, boundary.replan)
+    return tuple(dict.fromkeys(e for said in told if said is not None for e in said.exchanges))
 
 
 def taken(exchanges: Iterable[Exchange]) -> Taken:

@@ -324,17 +324,19 @@ def _judges(verdict: Verdict, watched: Sequence[Verdict]) -> str:
     others = [v for v in watched if v.detector != verdict.detector and v.judged]
 
     def named(decision: Decision) -> list[str]:
-        return [f"by the {_judge(v.detector)}" for v in others if v.decision is decision]
+        return [f"by the {_judge(v)}" for v in others if v.decision is decision]
 
-    by = [f"by the {_judge(verdict.detector)}", *named(Decision.REPLAN)]
+    by = [f"by the {_judge(verdict)}", *named(Decision.REPLAN)]
     unsure = [x.removeprefix("by ") for x in named(Decision.LOOK_AGAIN)]
     said = f"the alarm is raised {listed(by)}"
     said += f", not {listed(named(Decision.PROCEED), 'or')}" if named(Decision.PROCEED) else ""
     return said + (f"; too little was seen for {listed(unsure)}" if unsure else "")
 
 
-def _judge(name: str) -> str:
-    plain = name.replace("_", " ").replace("-", " ")
+def _judge(verdict: Verdict) -> str:
+    if verdict.expected_by:
+        return f"needs that the language model {verdict.expected_by} expects"
+    plain = verdict.detector.replace("_", " ").replace("-", " ")
     return _CALLED.get(plain, plain)
 
 

@@ -77,6 +77,8 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "note": verdict.note,
         "lacking": [str(x) for x in verdict.lacking],
         "p_value": verdict.p_value,
+        **({"expected_by": verdict.expected_by} if verdict.expected_by else {}),
+        **exchanges_json(verdict.exchanges),
     }
 
 
@@ -96,6 +98,8 @@ def verdict_from(field: Field) -> Verdict:
         note=field["note"].text(),
         lacking=field["lacking"].tuple_of(literal),
         p_value=field.optional("p_value", Field.number),
+        expected_by=field.optional("expected_by", Field.text) or "",
+        exchanges=exchanges_from(field),
     )
 
 

@@ -210,6 +210,7 @@ def _episode(row: EpisodeRow, links: Mapping[str, str]) -> EpisodeView:
     how = [] if row.strategy in ("none", data.WATCH) else [f"{row.detector} {row.threshold:.2f}"]
     if row.without is not None:
         how.append(f"without {row.without}")
+    how += [f"reasoning by {row.reasoning}"] if row.reasoning != "templates" else []
     how += [f"{row.model} model"] if row.model != "exact" else []
     how += [f"{row.demonstrations} demonstrations"] if row.demonstrations != "4" else []
     if row.implied:
@@ -246,6 +247,7 @@ def _order(row: EpisodeRow) -> tuple[Any, ...]:
             row.strategy,
         ),
         *(row.detector, row.threshold, row.without or "", row.model, row.demonstrations),
+        row.reasoning,
     )
 
 

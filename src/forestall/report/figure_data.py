@@ -158,7 +158,7 @@ def timelines(
     """
     groups: dict[_CASE, dict[str, EpisodeRow]] = defaultdict(dict)
     for row in sorted(rows, key=_preferred):
-        if row.without is None:
+        if row.without is None and row.reasoning == "templates":
             groups[case_of(row)].setdefault(_strategy(row), row)
     if case is None:
         able = [c for c, runs in groups.items() if len(runs) > 1 and _any(runs).failing]

@@ -28,9 +28,9 @@ from forestall.records.exchanges import Taken, exchanges_of, taken
 from forestall.records.pictures import Picture, page_picture, rgb_of
 from forestall.records.plain import plain
 from forestall.report.drawn import Drawn, drawn
+from forestall.report.exchange_view import ExchangeView, exchange_views
 from forestall.report.graph_svg import graph_svg
 from forestall.types.episode import EpisodeRecord, SkillStatus, StoredObservation
-from forestall.types.exchange import Exchange
 from forestall.types.observation import Observation
 from forestall.types.runtime import When
 from forestall.types.verdict import Verdict
@@ -84,7 +84,7 @@ class Card:
     cause: str
     outcome: str
     rows: tuple[PlanRow, ...]
-    exchanges: tuple[Exchange, ...]
+    exchanges: tuple[ExchangeView, ...]
     open: bool
 
 
@@ -136,7 +136,7 @@ def page_view(record: EpisodeRecord, folder: Path | None) -> Page:
         memory=_words(dict(record.provenance).get("memory")),
         reasoning_s=reasoning_s(record.compute_s),
         simulator_s=sum(s for n, s in record.compute_s if n in SIMULATOR_PHASES),
-        model=taken(e for c in cards for e in c.exchanges),
+        model=taken(e.told for c in cards for e in c.exchanges),
         phases=tuple(
             Bar(name, seconds, 100 * seconds / longest, aside=name in SIMULATOR_PHASES)
             for name, seconds in sorted(record.compute_s, key=lambda x: (-x[1], x[0]))
@@ -188,7 +188,7 @@ def _card(
         cause=cause_of(boundary) if boundary is not None and moment.alarm else "",
         outcome="" if outcome is None else outcome.value,
         rows=rows,
-        exchanges=() if boundary is None else exchanges_of(boundary),
+        exchanges=() if boundary is None else exchange_views(exchanges_of(boundary)),
         open=moment.alarm or look in ("refused", "replanned", "unsolved"),
     )
 

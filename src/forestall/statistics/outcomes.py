@@ -17,7 +17,7 @@ from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case
 from forestall.statistics.intervals import Clusters, Metric, Ratio, mean, measured
 from forestall.statistics.judges import PLAN_CHECK, PRIMARY
 from forestall.statistics.pairs import Paired, paired
-from forestall.statistics.rows import EXACT, NOBODY, PLAIN, EpisodeRow, Setup
+from forestall.statistics.rows import EXACT, NOBODY, PLAIN, TEMPLATES, EpisodeRow, Setup
 from forestall.statistics.watches import ALL, WATCH, canonical, case_of, unit_of
 
 NO_STRATEGY, POST_HOC, ONLINE, PROACTIVE = "none", "post-hoc", "online", "proactive"
@@ -47,6 +47,8 @@ def name_of(setup: Setup) -> str:
         parts.append(f"threshold {setup.threshold:.4g}")
     if setup.without is not None:
         parts.append(f"without {setup.without}")
+    if setup.reasoning != TEMPLATES:
+        parts.append(f"reasoning by {setup.reasoning}")
     if setup.model != EXACT:
         parts.append(f"{setup.model} model")
     if setup.demonstrations != PLAIN:

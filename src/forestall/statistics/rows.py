@@ -30,6 +30,9 @@ EXACT = "exact"
 PLAIN = "4"
 """Demonstrations when nothing is said: four of the nominal plan."""
 
+TEMPLATES, MODEL, MODEL_PLANS = "templates", "model", "model that plans"
+"""Who explains: templates over mined facts, a language model alone, one that plans alone, too."""
+
 NOBODY = ("none", "watch", "retry-once")
 """Strategies that judge nothing of what they see, so that model and memory make no difference."""
 
@@ -45,6 +48,7 @@ class Setup:
         profile: of the household, `KIND` or `HONEST`.
         model: of the domain that the monitor reads: "exact", "coarse" or "wrong".
         demonstrations: in its memory: how many, "varied" behind it where people's ways differ.
+        reasoning: who explains: `TEMPLATES`, `MODEL` or `MODEL_PLANS`.
     """
 
     strategy: str
@@ -54,6 +58,7 @@ class Setup:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+    reasoning: str = TEMPLATES
 
     @classmethod
     def of(cls, run: Any) -> Setup:
@@ -71,6 +76,8 @@ class Setup:
             parts += [f"{self.model}-model"] if self.model != EXACT else []
             told = self.demonstrations.replace(" ", "-")
             parts += [f"{told}-demonstrations"] if self.demonstrations != PLAIN else []
+            by = self.reasoning.replace(" ", "-")
+            parts += [f"reasoning-by-{by}"] if self.reasoning != TEMPLATES else []
         return "_".join(parts)
 
 
@@ -155,7 +162,7 @@ class EpisodeRow:
         simulated_s: robot time.
         compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
         not_judged: moments before a subtask of which the monitor said that nothing was judged.
-        profile: see `Setup`. `model`, `demonstrations`: likewise.
+        profile: see `Setup`. `model`, `demonstrations`, `reasoning`: likewise.
         slips: how many motions of the robot did not come out as they were meant (truth).
         causes: truth: facts, as text, that are the reason why the run fails without a monitor; see
             `tasks.causes`. Empty if not failing, or where none was found.
@@ -202,6 +209,7 @@ class EpisodeRow:
     demonstrations: str = PLAIN
     slips: int = 0
     causes: tuple[str, ...] = ()
+    reasoning: str = TEMPLATES
     provenance: dict[str, Any] = field(default_factory=dict, hash=False)
 
     @property

@@ -243,16 +243,22 @@ def _ablation(summary: Mapping[str, Any], names: Names) -> Table:
 
 
 def _parts(summary: Mapping[str, Any], names: Names) -> Table:
-    rows = [
-        (of, shown(name, names), *cells(metrics, _OUTCOMES))
+    by_model = f"{PROACTIVE}, reasoning by"
+    found = [
+        (of, name, metrics)
         for of, name, metrics in _by_set(summary["strategies"])
-        if name == PROACTIVE or name.startswith(f"{PROACTIVE}, without")
+        if name == PROACTIVE or name.startswith((f"{PROACTIVE}, without", by_model))
     ]
+    rows = [(of, shown(name, names), *cells(metrics, _OUTCOMES)) for of, name, metrics in found]
     return Table(
         "ablation-parts",
         "Parts of the proactive strategy left out (the paper's Table 2, right)",
         ("set", "strategy", *heads(_OUTCOMES)),
         tuple(rows),
+        "The plain strategy reasons by templates over mined facts. A model stands alone: nobody "
+        "explains, or plans where it plans, in its place."
+        if any(name.startswith(by_model) for _, name, _ in found)
+        else "",
     )
 
 

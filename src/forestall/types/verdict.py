@@ -139,7 +139,7 @@ class Precondition:
     that it is a need and no habit. `kept` is the level that support and weight are of; `levels` has
     the support at each. `elsewhere` counts the demonstrations in which it held at other times for
     things of these kinds, and those in which it did not: without the second nothing ever varied.
-    `by_hand`: a person says so.
+    `by_hand`: a person says so. `expected_by`: the language model that says so; nobody showed it.
     """
 
     skill: str
@@ -151,6 +151,7 @@ class Precondition:
     levels: tuple[Support, ...] = ()
     elsewhere: tuple[int, int] = (0, 0)
     by_hand: bool = False
+    expected_by: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +191,8 @@ class Verdict:
     note: str = ""
     lacking: tuple[Literal, ...] = ()  # facts that should hold and do not, where it knows any
     p_value: float | None = None  # how rare a score this low is in good runs; None: not calibrated
+    expected_by: str = ""  # the language model that this rests on, and no demonstration
+    exchanges: tuple[Exchange, ...] = ()  # with a language model, about what should hold here
 
     def __post_init__(self) -> None:
         if not isinstance(self.decision, Decision):
