@@ -90,17 +90,19 @@ def test_perception_that_does_not_answer_holds_and_nothing_is_asked_before_a_new
 
 def test_perception_is_told_what_was_carried_out_and_holds_where_it_fails_then() -> None:
     monitor, eye = seeing(Limits())
-    told: list[Subtask] = []
-    eye.acted = told.append  # type: ignore[attr-defined]
+    told: list[tuple[Subtask, bool]] = []
+    eye.acted = lambda *what: told.append(what)  # type: ignore[attr-defined]
     monitor.before(seen(1))
     monitor.after(REFUSED)
     assert told == [], "nothing was done"
     monitor.start(PLAN)
     monitor.before(seen(2))
     monitor.after(replace(DONE, status=SkillStatus.FAILED))
-    assert told == [Subtask.parse("pick_up(Mug-1)")]
+    monitor.before(seen(2.5))
+    monitor.after(DONE)
+    assert [(s.skill, done) for s, done in told] == [("pick_up", False), ("put_in", True)]
 
-    def breaks(subtask: Subtask) -> None:
+    def breaks(subtask: Subtask, succeeded: bool) -> None:
         raise ValueError(subtask.skill)
 
     eye.acted = breaks  # type: ignore[attr-defined]
