@@ -102,9 +102,8 @@ class SceneMemory:
         self._relate(seen, views)
         self._mark(seen, fate, views)
         guessed = {n for v in views for n in v.guessed if n in seen - was}
-        self._relations = settled(
-            self.tracks, self._relations, guessed, observation.told, self._domain
-        )
+        told, rules = observation.told, (self._domain, self._config)
+        self._relations = settled(self.tracks, self._relations, guessed, told, *rules)
 
     def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""
@@ -129,6 +128,7 @@ class SceneMemory:
             track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
                 track.feature = sighting.feature or track.feature
+                track.look = track.look if sighting.look is None else sighting.look
         self._take_note(views, time_s)
         return set(shown)
 

@@ -34,6 +34,7 @@ class Errors:
         pose_deg: of its direction.
         outline_px: up to how many pixels a mask is too wide or too narrow.
         missed: share of masks that are missing.
+        least_px: masks of fewer pixels are missing, too.
         mislabelled: share of movable things that are called by another category.
         gain: brightness is off by up to this share.
         blur_px: length of motion blur, sideways.
@@ -46,6 +47,7 @@ class Errors:
     pose_deg: float = 0.0
     outline_px: int = 0
     missed: float = 0.0
+    least_px: int = 0
     mislabelled: float = 0.0
     gain: float = 0.0
     blur_px: int = 0
@@ -58,7 +60,7 @@ class Errors:
         for name in ("missed", "mislabelled", "gain"):
             if not 0 <= getattr(self, name) <= 1:
                 raise InputError(f"{name} of a sensor is a share from 0 to 1")
-        for name in ("pose_cm", "pose_deg", "blur_px", "colour_noise"):
+        for name in ("pose_cm", "pose_deg", "least_px", "blur_px", "colour_noise"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"{name} of a sensor is 0 or more")
         if not 0 <= self.outline_px <= _MOST_OUTLINE_PX:
@@ -109,7 +111,7 @@ class Sensor:
         depth = DEPTH_CAMERAS[errors.depth](frame.depth_m, frame.intrinsics, rng)
         ids, names = frame.instance_ids, frame.instance_names
         if ids is not None:
-            ids = without(ids, errors.missed, rng)
+            ids = without(ids, errors.missed, errors.least_px, rng)
             ids = moved_outlines(ids, errors.outline_px, rng)
             names = miscalled(names, self.labels, errors.mislabelled, rng)
         return replace(
