@@ -21,7 +21,7 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, STRATEGY
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, UNDISTURBED, Case, cases
 from forestall.statistics.judges import THRESHOLDS
-from forestall.statistics.rows import EXACT, HONEST, KIND, PLAIN, Setup
+from forestall.statistics.rows import EXACT, HONEST, KIND, PERFECT, PLAIN, Setup
 from forestall.statistics.watches import PAPER_SET
 from forestall.tasks.variation import MOST
 
@@ -145,6 +145,7 @@ class Run:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+    sensor: str = PERFECT
 
     @property
     def setup(self) -> Setup:

@@ -18,12 +18,12 @@ from forestall.assembly.make import Prepared, make_world, needs_memory, prepare,
 from forestall.domain.distort import distorted
 from forestall.errors import ForestallError
 from forestall.experiments.runs import MODELS, Run, Settings
-from forestall.kinds import WORLD
+from forestall.kinds import SENSOR, WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
 from forestall.seams import WorldPart
-from forestall.statistics.rows import EXACT, KIND, EpisodeRow, Judged
+from forestall.statistics.rows import EXACT, KIND, PERFECT, EpisodeRow, Judged
 from forestall.statistics.watches import WATCH
 from forestall.tasks.causes import causes
 from forestall.tasks.faults import knowable
@@ -85,7 +85,9 @@ def config_of(run: Run, settings: Settings) -> RunConfig:
         seed=case.seed,
         without=run.without,
         keep_observations=False,
-        given=_household(run.profile, settings).over(Given.named({"limit": UNLIMITED})),
+        given=_through(run.sensor)
+        .over(_household(run.profile, settings))
+        .over(Given.named({"limit": UNLIMITED})),
         strategy=strategy,
         detector={"name": run.detector, "threshold": run.threshold},
     )
@@ -112,6 +114,15 @@ def _household(profile: str, settings: Settings) -> Given:
     if profile == KIND:
         return settings.given
     return Given.named({"world.profile": profile}).over(settings.given)
+
+
+def _through(sensor: str) -> Given:
+    """What a run says of its sensor, over what was said for all: a name, or some errors."""
+    if sensor == PERFECT:
+        return Given()
+    if "=" not in sensor:
+        return Given.named({SENSOR.name: sensor})
+    return Given.said(f"{SENSOR.name}.{error}" for error in sensor.split(","))
 
 
 def prepared_run(run: Run, settings: Settings) -> Prepared:
@@ -275,6 +286,7 @@ def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
         "profile": run.profile,
         "model": run.model,
         "demonstrations": run.demonstrations,
+        "sensor": run.sensor,
         "known": moments[0] if told else None,
         "effect": moments[1] if told else None,
     }

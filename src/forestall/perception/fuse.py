@@ -110,8 +110,7 @@ class SceneMemory:
         found = gather(views)
         fixtures = {n for n, f in found.items() if self._is_fixture(f[-1].category)}
         movable = {n: f for n, f in found.items() if n not in fixtures}
-        along = riding(self.tracks, self.held)
-        shown = placing(movable, self.held, along, self._config.ring_m)
+        shown = placing(movable, self.held, riding(self.tracks, self.held), self._config.ring_m)
         shown |= {n: found[n] for n in fixtures}
         for name in sorted(shown):
             track = self.tracks.get(name)
@@ -122,6 +121,7 @@ class SceneMemory:
             self._place(track, np.concatenate(points), fate.get(name))
             track.pixels = found[name][-1].cloud.pixels
             track.last_seen_s = time_s
+            track.sightings += len(shown[name])
             read = readings(found[name], self._config.glimpse_share)
             if name == self.held:
                 read = in_hand(read, track.states, self._changing)

@@ -2,9 +2,10 @@
 
 Two things cannot be at one place. Where a view shows something new in the place of something else,
 and no view shows both, the detector has called one thing by two names: what more views say counts,
-and what was known before counts as somewhat more than one view. So a single view that calls a thing
-something else is not believed unless the next observation says the same; two views are believed at
-once, since somebody may have put something else there. What a thing can turn into is no mistake.
+and what was known before counts as somewhat more than one view, if several showed it. So a single
+view that calls a thing something else is not believed unless the next observation says the same;
+two views are believed at once, since somebody may have put something else there. What hardly ever
+was seen was then never there. What a thing can turn into is no mistake.
 Called by the perceiver once all views of an observation have names; calls `tracks.py`.
 """
 
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from forestall.domain.model import Domain
-from forestall.perception.forgetting import Tracks
+from forestall.perception.forgetting import Tracks, remove
 from forestall.perception.surfaces import fixed
 from forestall.perception.tracks import View, riding
 from forestall.perception.unproject import Points
@@ -24,7 +25,7 @@ from forestall.types.observation import Vec3
 
 _SAME_SHARE = 0.4  # of the volume that two boxes have together, to be of one thing
 _PAD_M = 0.01  # boxes of flat things have hardly any volume
-_KNOWN = 1.5  # views that it weighs to have been known before
+_KNOWN, _EACH = 1.5, 0.75  # views that it weighs to have been known: at most, and for each view
 _AGAIN = 1.0  # that it weighs to have been called so in the last observation, too
 
 Corners = tuple[Points, Points]
@@ -49,7 +50,8 @@ def called_right(
 
     Args:
         views: of one observation.
-        tracks: what was known before; what a single view called each is noted there.
+        tracks: what was known before; what a single view called each is noted there, and what
+            was never there goes.
         held: names of what is in a hand: it turns with the robot from view to view.
         axis_m: where the robot stands.
         domain: tells what can be moved, and what turns into what.
@@ -69,6 +71,8 @@ def called_right(
             doubts[old] = seen[new].category
         elif old not in tracks:
             names[old] = new
+        elif old not in turning and tracks[old].sightings < 2 * len(seen[new].boxes):
+            remove(tracks, old, new)
     for name, track in tracks.items():
         if name in doubts or name in seen:
             track.doubted = doubts.get(name)
@@ -162,7 +166,7 @@ def _wins(new: str, old: str, seen: Mapping[str, _Seen], tracks: Tracks) -> bool
     track, views = tracks.get(old), len(seen[old].boxes) if old in seen else 0
     before, after = float(views), float(len(seen[new].boxes))
     if track is not None:
-        before += _KNOWN
+        before += min(_KNOWN, _EACH * track.sightings)
         after += _AGAIN * (track.doubted == seen[new].category)
     return after > before
 

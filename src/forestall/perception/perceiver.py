@@ -183,11 +183,12 @@ class GraphPerceiver:
         kinds = {d.category for m in masked for d in m.detections if d.instance is None}
         tracks, domain = self._memory.tracks, self._domain
         places = expected(tracks, observation, domain, kinds)
-        axis_m, told = observation.robot_position_world_m, [n for n, _ in observation.told]
+        axis_m = observation.robot_position_world_m
+        used = {*tracks, *(n for n, _ in observation.told)}
         parts: dict[str, str] = {}
         views: list[View] = []
         for frame, masks in zip(observation.frames, masked, strict=True):
-            view = self._view(frame, masks, places, axis_m, told)
+            view = self._view(frame, masks, places, axis_m, used)
             looks = view.looks or (None,) * len(view.ids)
             for name, category, cloud, look in zip(
                 view.ids, view.categories, view.clouds, looks, strict=True
@@ -213,7 +214,7 @@ class GraphPerceiver:
         masks: Masks,
         known: Mapping[str, Known],
         axis_m: Vec3,
-        told: Collection[str],
+        used: Collection[str],
     ) -> View:
         detections, labels = masks.detections, masks.labels
         states = self._estimator.estimate(frame, detections)
@@ -233,7 +234,7 @@ class GraphPerceiver:
             ]
         nameless = any(d.instance is None for d in detections)
         looks = mean_looks(frame.rgb, labels, len(detections)) if nameless else []
-        names = name_detections(detections, found, known, axis_m, self._config, told, looks)
+        names = name_detections(detections, found, known, axis_m, self._config, used, looks)
         return View(
             frame=frame,
             labels=labels,

@@ -26,7 +26,9 @@ class Track:
     `look` is its mean colour, (3,) from 0 to 1, where perception has to tell things apart itself.
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
     view that showed it showed it where it was before, `vague` that it was seen and never located,
-    `presumed` what skills should have made of states since they were read.
+    `presumed` what skills should have made of states since they were read. `sightings` counts the
+    views that showed it, `doubted` is another category that a single view of the newest observation
+    called it.
     """
 
     id: str
@@ -36,6 +38,7 @@ class Track:
     high_m: Points = field(default_factory=lambda: np.zeros(3))
     centroid_m: Points = field(default_factory=lambda: np.zeros(3))
     pixels: int = 0
+    sightings: int = 0
     seen: Seen = Seen.UNOBSERVED
     first_seen_s: float = 0.0
     last_seen_s: float = 0.0

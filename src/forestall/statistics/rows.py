@@ -30,6 +30,9 @@ EXACT = "exact"
 PLAIN = "4"
 """Demonstrations when nothing is said: four of the nominal plan."""
 
+PERFECT = "perfect"
+"""The sensor that was said for all runs; others are looked through besides."""
+
 NOBODY = ("none", "watch", "retry-once")
 """Strategies that judge nothing of what they see, so that model and memory make no difference."""
 
@@ -45,6 +48,8 @@ class Setup:
         profile: of the household, `KIND` or `HONEST`.
         model: of the domain that the monitor reads: "exact", "coarse" or "wrong".
         demonstrations: in its memory: how many, "varied" behind it where people's ways differ.
+        sensor: what the robot looks through: `PERFECT`, a sensor's name, or errors of the one that
+            was said, such as "outline_px=2".
     """
 
     strategy: str
@@ -54,6 +59,7 @@ class Setup:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+    sensor: str = PERFECT
 
     @classmethod
     def of(cls, run: Any) -> Setup:
@@ -67,6 +73,7 @@ class Setup:
             parts += [self.detector, f"{self.threshold:.2f}"]
         parts += [f"without-{self.without}"] if self.without else []
         parts += [self.profile] if self.profile != KIND else []
+        parts += [self.sensor] if self.sensor != PERFECT else []
         if self.strategy not in NOBODY:
             parts += [f"{self.model}-model"] if self.model != EXACT else []
             told = self.demonstrations.replace(" ", "-")
@@ -155,7 +162,7 @@ class EpisodeRow:
         simulated_s: robot time.
         compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
         not_judged: moments before a subtask of which the monitor said that nothing was judged.
-        profile: see `Setup`. `model`, `demonstrations`: likewise.
+        profile: see `Setup`. `model`, `demonstrations`, `sensor`: likewise.
         slips: how many motions of the robot did not come out as they were meant (truth).
         causes: truth: facts, as text, that are the reason why the run fails without a monitor; see
             `tasks.causes`. Empty if not failing, or where none was found.
@@ -200,6 +207,7 @@ class EpisodeRow:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+    sensor: str = PERFECT
     slips: int = 0
     causes: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict, hash=False)

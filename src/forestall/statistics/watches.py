@@ -40,6 +40,7 @@ def order(row: EpisodeRow) -> tuple[str | int | float, ...]:
         row.without or "",
         row.model,
         row.demonstrations,
+        row.sensor,
     )
 
 
