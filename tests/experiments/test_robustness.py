@@ -60,6 +60,12 @@ def test_every_case_is_seen_through_every_sensor_the_perfect_one_first() -> None
     assert len({r.key for r in runs}) == len(runs)
 
 
+def test_only_some_tasks_may_be_run() -> None:
+    runs = Robustness(limit=3, disturbances=("identities",), tasks=("make-coffee",)).runs()
+    assert {r.case.task for r in runs} == {"make-coffee"}
+    assert len({r.case for r in runs}) == 6
+
+
 def test_a_run_looks_through_what_its_sensor_says() -> None:
     for run in Robustness(limit=1).runs():
         chosen = config_of(run, Settings()).choice(SENSOR)
@@ -103,6 +109,10 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
         Robustness(disturbances=("mised",)).runs()
     with pytest.raises(UnknownNameError, match="honest"):
         Robustness(profile="honst").runs()
+    with pytest.raises(UnknownNameError, match="heat-potato"):
+        Robustness(tasks=("heat-potatoe",)).runs()
+    with pytest.raises(InputError, match="--limit 0"):
+        Robustness(limit=0).runs()
     with pytest.raises(InputError, match="by itself"):
         without_sensor(["world", "sensor"])
     play(tmp_path, Robustness(limit=1, disturbances=("identities",)))

@@ -29,6 +29,7 @@ def robustness(
     *,
     split: str = "development",
     limit: int | None = None,
+    task: Names = None,
     disturbance: Names = None,
     profile: str = "kind",
     judge: str = "scene-graph",
@@ -48,6 +49,7 @@ def robustness(
     Args:
         split: development (to look at and to tune on) or test (to report).
         limit: so many cases of each set, from all tasks in turn; 10 by default.
+        task: only cases of these tasks.
         disturbance: only these: camera, depth, pose, outline, missed, mislabelled, identities,
             small, realistic.
         profile: of the household: kind or honest.
@@ -74,7 +76,8 @@ def robustness(
 
     given = parts.given()
     without_sensor(given.kinds())
-    choice = Robustness(split, LIMIT if limit is None else limit, tuple(disturbance or ()), profile)
+    most = LIMIT if limit is None else limit
+    choice = Robustness(split, most, tuple(disturbance or ()), profile, tuple(task or ()))
     workers = jobs if jobs is not None else os.cpu_count() or 1
     settings = Settings(given, pages="none")
     experiment = Experiment(choice, workers, engine, settings=settings, kind=EXPERIMENT_KIND)

@@ -17,15 +17,17 @@ from typing import Any
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.experiments.folder import episodes_in
-from forestall.experiments.runs import PROFILES, Choice, Run, runs_for
+from forestall.experiments.runs import PROFILES, Choice, Run, in_turn, runs_for
 from forestall.files import make_folder, replace_file
 from forestall.report.robustness_figure import Line, Panel, robustness_figure
+from forestall.statistics.cases import Case
 from forestall.statistics.cells import Table, share
 from forestall.statistics.intervals import NOTHING, Metric
 from forestall.statistics.judges import PRIMARY
 from forestall.statistics.metrics import at_thresholds, detection_rates
 from forestall.statistics.rows import KIND, PERFECT, EpisodeRow
 from forestall.statistics.watches import ALL, PAPER_SET, WATCH, Watches
+from forestall.tasks.files import task_names
 
 EXPERIMENT_KIND = "robustness"
 
@@ -95,12 +97,14 @@ class Robustness:
         limit: cases of each set, from all tasks in turn.
         disturbances: names; all by default.
         profile: of the household.
+        tasks: only cases of these; all by default.
     """
 
     split: str = "development"
     limit: int = LIMIT
     disturbances: tuple[str, ...] = ()
     profile: str = KIND
+    tasks: tuple[str, ...] = ()
 
     def chosen(self) -> tuple[Disturbance, ...]:
         """The disturbances that are wanted.
@@ -118,22 +122,25 @@ class Robustness:
         """Every case through a perfect sensor, then through each other.
 
         Raises:
-            InputError: see `runs.runs_for`.
-            UnknownNameError: no such disturbance or profile.
+            InputError: a limit below 1.
+            UnknownNameError: no such disturbance, profile, split or task.
         """
+        if self.limit < 1:
+            raise InputError(f"--limit {self.limit}: at least 1 case of each set is needed")
+        for task in self.tasks:
+            if task not in task_names():
+                raise UnknownNameError("task", task, task_names())
         if self.profile not in PROFILES:
             raise UnknownNameError("profile of the household", self.profile, PROFILES)
         sensors = (PERFECT, *(s for d in self.chosen() for s in d.sensors))
-        plain = runs_for(
-            Choice(
-                "proactive",
-                self.split,
-                limit=self.limit,
-                sets=SETS,
-                strategies=(WATCH,),
-                profiles=(self.profile,),
-            )
+        choice = Choice(
+            "proactive", self.split, sets=SETS, strategies=(WATCH,), profiles=(self.profile,)
         )
+        of_set: dict[str, dict[Case, Run]] = {}
+        for run in runs_for(choice):
+            if run.case.task in (self.tasks or task_names()):
+                of_set.setdefault(run.case.set, {})[run.case] = run
+        plain = [of[case] for of in of_set.values() for case in in_turn(list(of), self.limit)]
         return tuple(replace(run, sensor=sensor) for run in plain for sensor in sensors)
 
     def about(self, domain: Domain | None = None) -> dict[str, Any]:
