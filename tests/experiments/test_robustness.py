@@ -38,6 +38,8 @@ def seen_row(work: Work) -> dict[str, Any]:
     if work.run.sensor == "missed=0.25":
         judged = tuple(replace(j, scores={"scene-graph": 0.5}) for j in row.judged)
         row = replace(row, judged=judged)
+    if work.run.sensor == "identities=false":
+        row = replace(row, error="the camera froze", end="held")
     if work.run.case.failing:
         row = replace(row, known=1, effect=2)
     return row.to_json()
@@ -95,6 +97,7 @@ def test_rows_become_a_table_and_a_figure_and_are_not_run_again(tmp_path: Path) 
     rates = {p.strength: p.rates[RUNS] for p in points(rows)}
     assert (rates["nothing wrong"].count, rates["share 25 %"].count) == (0, 2)
     assert made.rows[3][4].startswith("100.0 %") and made.rows[0][4].startswith("0.0 %")
+    assert [row[-1] for row in made.rows] == ["0", "0", "0", "0", "4"]
     told = json.loads((tmp_path / SUMMARY).read_text())
     assert (told["split"], len(told["points"])) == ("development", 5)
     svg = (tmp_path / FIGURE).read_text()

@@ -76,6 +76,15 @@ def test_two_views_are_believed_and_what_was_there_is_lost() -> None:
     assert gone is not None and gone.centroid_m is None
 
 
+def test_what_may_be_another_known_thing_is_believed_at_once() -> None:
+    elsewhere = at("Bowl-7", 0.6, 0.3, 0.9, SIZE, True)
+    perceiver = _perceiver()
+    first = perceiver.perceive(bare(observed([COUNTER, MUG, elsewhere], EYE, LEFT)))
+    assert _things(first) == {"Mug-1", "Bowl-1", "gripper"}
+    graph = perceiver.perceive(bare(observed([COUNTER, BOWL], EYE, time_s=1.0)))
+    assert _things(graph) == {"Bowl-1", "gripper"}
+
+
 def test_of_the_views_of_one_moment_most_count() -> None:
     right, wrong = observed([COUNTER, MUG], EYE, LEFT), observed([COUNTER, BOWL], RIGHT)
     assert _things(_perceiver().perceive(both(right, wrong))) == {"Mug-1", "gripper"}
@@ -100,6 +109,21 @@ def test_what_lies_on_something_and_what_it_turns_into_are_no_mistakes() -> None
     sliced = replace(POTATO, id="PotatoSliced-1")
     graph = perceiver.perceive(observed([COUNTER, PLATE, sliced], EYE, time_s=2.0))
     assert "PotatoSliced-1" in _things(graph) and "Potato-1" not in _things(graph)
+
+
+def test_what_rode_on_what_was_let_go_is_not_something_else_there() -> None:
+    """The plate was carried to the left with the potato on it, and a single view miscalls that."""
+    perceiver = _perceiver()
+    perceiver.perceive(observed([COUNTER, PLATE, POTATO], EYE, LEFT))
+    aside = (-0.5, 0.05, 0.0)
+    other = replace(POTATO, id="Bowl-3").moved((-0.53, 0.08, 0.0))
+    seen = observed([COUNTER, PLATE.moved(aside), other], LEFT, time_s=1.0)
+    hand = replace(seen.gripper, released="Plate-1", released_world_m=(-0.5, 0.35, 0.9125))
+    graph = perceiver.perceive(replace(seen, gripper=hand))
+    assert _things(graph) == {"Plate-1", "Potato-1", "gripper"}
+    node = graph.get("Potato-1")
+    assert node is not None and node.centroid_m is not None
+    assert node.centroid_m[0] == pytest.approx(-0.53, abs=0.03)
 
 
 def test_a_thing_that_no_mask_shows_and_that_is_still_there_stays() -> None:

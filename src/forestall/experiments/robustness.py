@@ -150,16 +150,18 @@ class Robustness:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One strength of one disturbance, and what a judge does with it."""
+    """One strength of one disturbance, what a judge does with it, and how many runs broke off."""
 
     disturbance: str
     strength: str
     rates: dict[str, Metric]
+    broken: int
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         rates = {name: metric.to_json() for name, metric in self.rates.items()}
-        return {"disturbance": self.disturbance, "strength": self.strength, "rates": rates}
+        said = {"disturbance": self.disturbance, "strength": self.strength}
+        return {**said, "rates": rates, "broken": self.broken}
 
 
 def points(rows: Iterable[EpisodeRow], judge: str = PRIMARY) -> list[Point]:
@@ -182,7 +184,7 @@ def points(rows: Iterable[EpisodeRow], judge: str = PRIMARY) -> list[Point]:
         for sensor, strength in zip(d.sensors, d.strengths, strict=True)
     ]
     return [
-        Point(name, strength, _rates(watched[sensor], judge))
+        Point(name, strength, _rates(watched[sensor], judge), _broken(watched[sensor]))
         for name, strength, sensor in said
         if sensor in watched
     ]
@@ -195,13 +197,22 @@ def _rates(of: Watches, judge: str) -> dict[str, Metric]:
     return {name: found[name] for _, name in _COLUMNS}
 
 
+def _broken(of: Watches) -> int:
+    """Runs that did not come to their end: nothing was judged from there on."""
+    return sum(bool(row.error) for row in of.rows)
+
+
 def table(found: Sequence[Point], judge: str, about: str) -> Table:
     """Every strength of every disturbance, a line each."""
     rows = [
-        (p.disturbance, p.strength, *(share(p.rates[n].to_json()) for _, n in _COLUMNS))
+        (
+            *(p.disturbance, p.strength),
+            *(share(p.rates[n].to_json()) for _, n in _COLUMNS),
+            str(p.broken),
+        )
         for p in found
     ]
-    header = ("disturbance", "strength", *(title for title, _ in _COLUMNS))
+    header = ("disturbance", "strength", *(title for title, _ in _COLUMNS), "broke off")
     return Table(TABLE, f"Robustness of {judge}: {about}", header, tuple(rows))
 
 

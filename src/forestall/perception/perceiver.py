@@ -205,8 +205,7 @@ class GraphPerceiver:
             if part in tracks:
                 remove(tracks, part, whole)
         views = [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
-        held = [h.holding for h in observation.hands if h.holding is not None]
-        return called_right(views, tracks, held, axis_m, domain)
+        return called_right(views, tracks, observation.hands, axis_m, domain)
 
     def _view(
         self,
