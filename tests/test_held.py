@@ -106,6 +106,7 @@ def test_perception_is_told_what_was_carried_out_and_holds_where_it_fails_then()
         raise ValueError(subtask.skill)
 
     eye.acted = breaks  # type: ignore[attr-defined]
+    monitor.start(PLAN)
     monitor.before(seen(3))
     held = monitor.after(DONE)
     assert held is not None and (held.outcome, held.hold) == (Outcome.HOLD, Hold.INTERNAL)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from forestall.domain.load import shipped
 from forestall.errors import InputError, ObservationError
@@ -186,6 +187,42 @@ def test_sizes_of_things_tell_the_scale_without_a_floor() -> None:
     alone = observed(table[:2], looking((0.0, -0.3, 1.3), (0.0, 0.4, 0.75)))
     assert refused(alone) == set()
     assert "sizes" in refused(depth(lambda z: z * 4)(alone))
+
+
+def tilted(observation: Observation, degrees: float, axis: int) -> Observation:
+    """The observation with a camera that is believed to be turned about an axis of the world."""
+    turn = Rotation.from_rotvec(np.deg2rad(degrees) * np.eye(3)[axis]).as_matrix()
+
+    def change(frame: Frame) -> Frame:
+        leaning = frame.camera_to_world.copy()
+        leaning[:3, :3] = turn @ leaning[:3, :3]
+        return replace(frame, camera_to_world=leaning)
+
+    return with_frame(observation, change)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(
+    ("degrees", "said", "refuses"),
+    [(0.0, False, False), (2.0, False, False), (6.0, True, False), (12.0, True, True)],
+)
+def test_planes_are_held_against_the_stated_gravity(
+    degrees: float, axis: int, said: bool, refuses: bool
+) -> None:
+    found = [f for f in inspect(tilted(room(), degrees, axis)) if f.what == "pose"]
+    assert bool(found) == said
+    if said:
+        assert f"lean by {degrees:.0f} degrees" in found[0].sentence
+        assert found[0].refuses == refuses
+
+
+def test_one_slope_with_nothing_that_stands_is_not_refused() -> None:
+    eye = looking((0.0, -1.0, 1.2), (0.0, 0.0, 0.0))
+    slope = picture([Solid("Table-1", (-4.0, -4.0, -0.02), (4.0, 4.0, 0.0))], eye)
+    grain = np.random.default_rng(0).integers(0, 20, slope.rgb.shape).astype(np.uint8)
+    seen = Observation((replace(slope, rgb=grain),), GripperState(None, HAND), 0.0)
+    (found,) = [f for f in inspect(tilted(seen, 12.0, 0)) if f.what == "pose"]
+    assert "lean" in found.sentence and not found.refuses
 
 
 def test_a_table_that_leans_is_refused_and_a_slanted_thing_is_not() -> None:

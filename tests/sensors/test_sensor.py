@@ -88,13 +88,18 @@ def test_outlines_move_by_no_more_than_was_said() -> None:
 def test_masks_are_missed_and_miscalled_as_often_as_was_said() -> None:
     rng = np.random.default_rng(0)
     ids = np.arange(2000, dtype=np.int32).reshape(40, 50)
-    assert (without(ids, 0.05, rng) < 0).mean() == pytest.approx(0.05, abs=0.02)
+    assert (without(ids, 0.05, 0, rng) < 0).mean() == pytest.approx(0.05, abs=0.02)
     names = [f"Mug-{i}" for i in range(2000)]
     found = miscalled(names, ["Mug", "Cup"], 0.02, rng)
     wrong = [n for n in found if n.startswith("Cup-")]
     assert len(wrong) / 2000 == pytest.approx(0.02, abs=0.01)
     assert len(set(found)) == 2000
     assert miscalled(["Floor-1"], ["Mug", "Cup"], 1.0, rng) == ("Floor-1",)
+
+
+def test_masks_of_few_pixels_are_missing() -> None:
+    found = without(squares(), 0.0, 500, np.random.default_rng(0))
+    assert set(np.unique(found)) == {-1, 1}
 
 
 def equal(one: Observation, two: Observation) -> bool:

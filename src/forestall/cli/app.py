@@ -8,7 +8,7 @@ import cyclopts
 from cyclopts import App
 
 import forestall
-from forestall.cli import experiments, third_party
+from forestall.cli import experiments, robustness, third_party
 from forestall.cli.bench import bench
 from forestall.cli.calibrate import calibrate
 from forestall.cli.cases import cases
@@ -41,6 +41,7 @@ app.command(bench)
 app.command(cases)
 experiments.register(bench)
 third_party.register(bench)
+robustness.register(bench)
 app.command(encoder)
 app.command(plan)
 app.command(preconditions)

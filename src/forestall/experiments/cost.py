@@ -11,10 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from forestall.experiments.runs import Run
-from forestall.statistics.rows import NOBODY
+from forestall.statistics.rows import NOBODY, PERFECT
 
 FIRST_S = 0.65
 """Seconds of one core for a step of the watched run: nearly all is drawn for the first time."""
+
+SENSED_S = 0.6
+"""For a step of a run through another sensor, whose pictures were drawn for the one without."""
 
 AGAIN_S = 0.09
 """For a step of a run in which nobody steps in: it sees what was drawn for the watched one."""
@@ -68,7 +71,9 @@ def cost_of(runs: Sequence[tuple[Run, int]], recorded_steps: int, workers: int) 
     """
     seconds = 0.0
     for run, steps in runs:
-        if run.strategy == "watch":
+        if run.sensor != PERFECT:
+            seconds += SENSED_S * steps
+        elif run.strategy == "watch":
             seconds += FIRST_S * steps
         else:
             seconds += (AGAIN_S if run.strategy in NOBODY else APART_S) * steps

@@ -27,6 +27,7 @@ from forestall.statistics.rows import (
     KIND,
     MODEL,
     MODEL_PLANS,
+    PERFECT,
     PLAIN,
     TEMPLATES,
     Setup,
@@ -160,6 +161,7 @@ class Run:
     model: str = EXACT
     demonstrations: str = PLAIN
     reasoning: str = TEMPLATES
+    sensor: str = PERFECT
 
     @property
     def setup(self) -> Setup:
@@ -312,7 +314,7 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
             part *= QUICK
         if part < 1:
             every = _some(every, part, TURN * place if honest else 0, place)
-        found[of] = _limited(every, choice.limit)
+        found[of] = in_turn(every, choice.limit)
     return found
 
 
@@ -322,7 +324,7 @@ def _some(found: Sequence[Case], part: float, turn: int = 0, task: int = 0) -> S
     `turn`: with which case of each task it begins, and `task`: with which task; whatever they are,
     a smaller part is in a larger.
     """
-    return _limited(found, max(1, round(len(found) * part)), turn, task)
+    return in_turn(found, max(1, round(len(found) * part)), turn, task)
 
 
 @cache
@@ -364,9 +366,10 @@ def by_scene(runs: Iterable[Run]) -> list[list[Run]]:
     ]
 
 
-def _limited(
+def in_turn(
     found: Sequence[Case], limit: int | None, turn: int = 0, task: int = 0
 ) -> Sequence[Case]:
+    """At most so many cases, from all tasks in turn; `turn`, `task`: with which it begins."""
     if limit is None:
         return found
     of_task: dict[str, list[Case]] = {}
@@ -374,8 +377,8 @@ def _limited(
         of_task.setdefault(case.task, []).append(case)
     tasks = [_from(turn, several) for several in _from(task, list(of_task.values()))]
     most = max(map(len, tasks), default=0)
-    in_turn = [several[k] for k in range(most) for several in tasks if k < len(several)]
-    return in_turn[:limit]
+    every = [several[k] for k in range(most) for several in tasks if k < len(several)]
+    return every[:limit]
 
 
 def _from(first: int, things: list[T]) -> list[T]:

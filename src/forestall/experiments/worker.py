@@ -18,7 +18,7 @@ from forestall.assembly.make import Prepared, make_world, needs_memory, prepare,
 from forestall.domain.distort import distorted
 from forestall.errors import ForestallError
 from forestall.experiments.runs import MODELS, Run, Settings
-from forestall.kinds import WORLD
+from forestall.kinds import SENSOR, WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.exchanges import exchanges_of
 from forestall.records.record import RunRecorder
@@ -29,6 +29,7 @@ from forestall.statistics.rows import (
     KIND,
     MODEL,
     MODEL_PLANS,
+    PERFECT,
     TEMPLATES,
     EpisodeRow,
     Judged,
@@ -104,6 +105,7 @@ def config_of(run: Run, settings: Settings) -> RunConfig:
         without=run.without,
         keep_observations=False,
         given=Given.named(REASONING[run.reasoning])
+        .over(_through(run.sensor))
         .over(_household(run.profile, settings))
         .over(Given.named({"limit": UNLIMITED})),
         strategy=strategy,
@@ -132,6 +134,15 @@ def _household(profile: str, settings: Settings) -> Given:
     if profile == KIND:
         return settings.given
     return Given.named({"world.profile": profile}).over(settings.given)
+
+
+def _through(sensor: str) -> Given:
+    """What a run says of its sensor, over what was said for all: a name, or some errors."""
+    if sensor == PERFECT:
+        return Given()
+    if "=" not in sensor:
+        return Given.named({SENSOR.name: sensor})
+    return Given.said(f"{SENSOR.name}.{error}" for error in sensor.split(","))
 
 
 def prepared_run(run: Run, settings: Settings) -> Prepared:
@@ -296,6 +307,7 @@ def _identity(run: Run, prepared: Prepared) -> dict[str, Any]:
         "model": run.model,
         "demonstrations": run.demonstrations,
         "reasoning": run.reasoning,
+        "sensor": run.sensor,
         "known": moments[0] if told else None,
         "effect": moments[1] if told else None,
     }

@@ -99,6 +99,12 @@ class PerceptionConfig:
         max_lost: things of one category whose place is lost that are remembered; the last ones.
         max_things: things remembered in all; what has not been observed for longest goes first.
         same_place_m: distance over which an untracked detection is the same object as before.
+        same_gap_m: gap of boxes over which a thing that nothing moved is another one (the error of
+            a pose: 1 cm).
+        same_gap_share: the same as a share of how far away it is (2 degrees).
+        unlike_m: metres that it counts to differ wholly in colour, or in size by a factor of 2.7,
+            where several things are near enough.
+        unlike_far_m: the same for things that come back at another place.
         same_surface_share: share of what an untracked view shows of a piece of furniture that must
             lie on what is known of it, or the other way round, to be the same piece.
     """
@@ -164,6 +170,10 @@ class PerceptionConfig:
     interior_share: float = 0.1
     glimpse_share: float = 0.5
     same_place_m: float = 0.3
+    same_gap_m: float = 0.05
+    same_gap_share: float = 0.035
+    unlike_m: float = 0.1
+    unlike_far_m: float = 2.0
     same_surface_share: float = 0.25
     same_share: float = 0.3
     max_lost: int = 5

@@ -102,17 +102,15 @@ class SceneMemory:
         self._relate(seen, views)
         self._mark(seen, fate, views)
         guessed = {n for v in views for n in v.guessed if n in seen - was}
-        self._relations = settled(
-            self.tracks, self._relations, guessed, observation.told, self._domain
-        )
+        told, rules = observation.told, (self._domain, self._config)
+        self._relations = settled(self.tracks, self._relations, guessed, told, *rules)
 
     def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""
         found = gather(views)
         fixtures = {n for n, f in found.items() if self._is_fixture(f[-1].category)}
         movable = {n: f for n, f in found.items() if n not in fixtures}
-        along = riding(self.tracks, self.held)
-        shown = placing(movable, self.held, along, self._config.ring_m)
+        shown = placing(movable, self.held, riding(self.tracks, self.held), self._config.ring_m)
         shown |= {n: found[n] for n in fixtures}
         for name in sorted(shown):
             track = self.tracks.get(name)
@@ -123,12 +121,14 @@ class SceneMemory:
             self._place(track, np.concatenate(points), fate.get(name))
             track.pixels = found[name][-1].cloud.pixels
             track.last_seen_s = time_s
+            track.sightings += len(shown[name])
             read = readings(found[name], self._config.glimpse_share)
             if name == self.held:
                 read = in_hand(read, track.states, self._changing)
             track.states.update(read)
             for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
                 track.feature = sighting.feature or track.feature
+                track.look = track.look if sighting.look is None else sighting.look
         self._take_note(views, time_s)
         return set(shown)
 

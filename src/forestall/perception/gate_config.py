@@ -39,6 +39,12 @@ class GateConfig:
         clear_upright: share that must lie or stand by another direction to call the stated one
             wrong: a room that leans as a whole.
         clear_flat: share of flat patches that this other direction must have.
+        lean_said_deg: angle between the stated gravity and that of the planes in a picture from
+            which it is said (a camera on a robot: 1 or 2).
+        lean_refused_deg: from which it is refused, where planes lie and others stand by it.
+        lean_near_deg: how far from a direction a patch counts as of it.
+        lean_share: share of patches that must lie or stand by the planes' gravity.
+        lean_ratio: how many times as many must lie by it as by the stated one.
         least_flat: share of a support's patches that lie flat, below which something is wrong if
             the others agree on another direction.
         min_edges: outline cells of masks without which they are not held against depth.
@@ -77,6 +83,11 @@ class GateConfig:
     min_upright: float = 0.35
     clear_upright: float = 0.6
     clear_flat: float = 0.1
+    lean_said_deg: float = 4.0
+    lean_refused_deg: float = 10.0
+    lean_near_deg: float = 3.0
+    lean_share: float = 0.35
+    lean_ratio: float = 2.0
     least_flat: float = 0.1
     min_edges: int = 150
     edge_step: float = 0.02

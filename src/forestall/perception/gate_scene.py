@@ -1,12 +1,14 @@
 """What depth shows against gravity, the floor, the hand and the sizes of things.
 
 Called by `gate.py`. Rooms are built level: most of their surfaces lie or stand. If they do so by
-another direction than by the stated "up", the pose, the axes or the focal length are wrong.
+another direction than by the stated "up", the pose, the axes or the focal length are wrong. Where
+it is near the stated one, the angle between the two is measured.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,6 +23,7 @@ from forestall.types.observation import GripperState, Observation
 _PATCHES = 1500
 _APART_M = 0.08
 _DIRECTIONS = 300
+_WIDTHS_DEG = (30.0, 15.0, 6.0)
 _UPWARDS = np.array([[0.0, 0.0, 1.0]])
 _AXES = (
     "check camera_to_world, its axes (camera_axes: opencv is x right, y down, z forward), which "
@@ -39,6 +42,8 @@ def judge_scene(
     leaning = _gravity(look, limits)
     if leaning is not None:
         yield Finding("pose", leaning, index)
+    else:
+        yield from _lean(look, index, limits)
     if domain is None:
         return
     if leaning is None:
@@ -110,6 +115,46 @@ def _gravity(look: Coarse, limits: GateConfig) -> str | None:
             f"stated one: {_AXES}"
         )
     return None
+
+
+def _lean(look: Coarse, index: int, limits: GateConfig) -> Iterator[Finding]:
+    """The angle between the stated gravity and that of the planes, where both are near."""
+    normals = _thinned(look.normals())
+    if len(normals) < limits.min_normals:
+        return
+    up = _planes_up(normals, limits)
+    angle = float(np.degrees(np.arccos(min(1.0, float(up[2])))))
+    if angle < limits.lean_said_deg:
+        return
+    sharp = replace(limits, level=float(np.cos(np.deg2rad(limits.lean_near_deg))))
+    flat, level = _level(normals, np.stack([up, _UPWARDS[0]]), sharp)
+    least = max(limits.clear_flat, limits.lean_ratio * float(flat[1]))
+    if float(level[0]) < limits.lean_share or float(flat[0]) < least:
+        return
+    both = min(float(flat[0]), float(level[0] - flat[0])) > limits.clear_flat
+    yield Finding(
+        "pose",
+        f"the planes of the picture lean by {angle:.0f} degrees against the stated gravity: "
+        f"{100 * float(flat[0]):.0f} % of its surfaces lie by theirs, {100 * float(flat[1]):.0f} % "
+        "by the stated one; check the rotation of camera_to_world",
+        index,
+        refuses=both and angle >= limits.lean_refused_deg,
+    )
+
+
+def _planes_up(normals: Points, limits: GateConfig) -> Points:
+    """The direction near the stated one by which most patches lie or stand, in narrowing steps."""
+    stated: Points = _UPWARDS[0]
+    up = stated
+    for width in _WIDTHS_DEG:
+        along = np.abs(normals @ up)
+        lying = normals[along > np.cos(np.deg2rad(width))]
+        standing = normals[along < np.sin(np.deg2rad(width))]
+        if len(lying) < limits.clear_flat * len(normals):
+            return stated
+        _, directions = np.linalg.eigh(lying.T @ lying - standing.T @ standing)
+        up = directions[:, -1] * (1.0 if directions[2, -1] >= 0 else -1.0)
+    return up
 
 
 def _from_below(look: Coarse, normals: Points, limits: GateConfig) -> bool:

@@ -1,9 +1,10 @@
 """Names for detections whose segmenter does not track instances.
 
-A detection takes the name of what is known where it is (assignment by least total distance), or a
-new number. Small things are where their middle is; of furniture a view shows a part, and the part
-lies on what is known of it. What is in the hand goes round with the robot between two views.
-Called by the perceiver.
+A detection takes the name of what is known where it is (assignment by least total distance, in
+which size and look decide between things side by side), or a new number. Nothing moves by itself:
+what is known is where its box was, as far as a pose may be wrong; where a thing was moved,
+`own_names.py` finds it again. Of furniture a view shows a part, and the part lies on what is known
+of it. What is in the hand goes round with the robot between two views. Called by the perceiver.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.unproject import Cloud, Points
+from forestall.perception.unproject import Cloud, Labels, Points
 from forestall.types.facts import category_of
-from forestall.types.observation import Detection
+from forestall.types.observation import Detection, Rgb
 
 Cells = npt.NDArray[np.int64]
 
@@ -27,6 +28,8 @@ _CELL_M = 0.03
 _SAMPLES = 300
 _EDGE_SHARE = 0.02  # what two sides of one piece share: the edge between them
 _FLAT = 0.2  # thickness of a side, as a share of its middle extent
+_THIN = 3  # every so many pixels tell a colour
+_LEAST_M = 0.01  # extents under it are alike
 _PART_SHARE = 0.5  # of a part that lies on a piece
 _BITS = 16
 _AROUND = np.array([(x << 2 * _BITS) + (y << _BITS) + z for x, y, z in np.ndindex(3, 3, 3)]) - (
@@ -42,7 +45,8 @@ class Known:
         centroid_m: (3,) in the world.
         cells: what is known of the surface of a piece of furniture, as sorted keys of a grid; None
             for other things.
-        box_m: (2, 3) lower and upper corner of that surface.
+        box_m: (2, 3) lower and upper corner of what is known; None for what was just let go.
+        look: (3,) mean colour from 0 to 1, None where it is not known.
         only: whether there is no other of its category: the ground.
         turning: whether it is in the hand, or on what is: it stands at another side of the robot
             in every view, as far from its axis and as high.
@@ -53,19 +57,24 @@ class Known:
     box_m: Points | None = None
     turning: bool = False
     only: bool = False
+    look: Points | None = None
 
     @classmethod
-    def of(cls, points_m: Points, centroid_m: Points, fixed: bool) -> Known:
+    def of(
+        cls, points_m: Points, centroid_m: Points, fixed: bool, look: Points | None = None
+    ) -> Known:
         """Of all that is remembered of a thing."""
-        if not fixed:
-            return cls(centroid_m)
-        return cls(centroid_m, _cells(points_m), _box(points_m))
+        cells = _cells(points_m) if fixed else None
+        return cls(centroid_m, cells, _box(points_m), look=look)
 
     def with_view(self, seen: Known) -> Known:
         """What is known with one more view of it."""
-        if seen.cells is None or self.cells is None:
-            return replace(seen, turning=self.turning)
-        return self.joined(seen)
+        if seen.cells is not None and self.cells is not None:
+            return self.joined(seen)
+        look = self.look if seen.look is None else seen.look
+        if self.turning or self.box_m is None or seen.box_m is None:
+            return replace(seen, turning=self.turning, look=look)
+        return replace(seen, box_m=_box(np.concatenate([self.box_m, seen.box_m])), look=look)
 
     def joined(self, other: Known) -> Known:
         """A piece of furniture of which two parts are known."""
@@ -90,6 +99,7 @@ def name_detections(
     axis_m: Sequence[float],
     config: PerceptionConfig,
     reserved: Collection[str] = (),
+    looks: Sequence[Points | None] = (),
 ) -> list[str]:
     """An instance name for every detection.
 
@@ -100,7 +110,9 @@ def name_detections(
         axis_m: where the robot stands.
         config: how far off a thing may be, and how much of what a view shows must be known.
         reserved: names that nothing gets for its place.
+        looks: mean colour of each, where it is known.
     """
+    shown = dict(enumerate(looks))
     names = [d.instance or "" for d in detections]
     taken = {n for n in names if n}
     open_ones = [i for i, n in enumerate(names) if not n]
@@ -108,7 +120,7 @@ def name_detections(
         mine = [i for i in open_ones if detections[i].category == category]
         mine.sort(key=lambda i: _order(clouds[i]))
         options = [n for n in sorted(known) if category_of(n) == category and n not in taken]
-        located = {i: cloud for i in mine if (cloud := clouds[i]) is not None}
+        located = {i: (cloud, shown.get(i)) for i in mine if (cloud := clouds[i]) is not None}
         there = {n: known[n] for n in options}
         for i, name in _assigned(located, there, np.asarray(axis_m), config).items():
             names[i] = name
@@ -134,7 +146,7 @@ def _order(cloud: Cloud | None) -> tuple[float, ...]:
 
 
 def _assigned(
-    clouds: Mapping[int, Cloud],
+    clouds: Mapping[int, tuple[Cloud, Points | None]],
     known: Mapping[str, Known],
     axis_m: Points,
     config: PerceptionConfig,
@@ -143,7 +155,7 @@ def _assigned(
     if not clouds or not known:
         return {}
     cost = np.array(
-        [[_cost(c, k, axis_m, config) for k in known.values()] for c in clouds.values()]
+        [[_cost(*c, k, axis_m, config) for k in known.values()] for c in clouds.values()]
     )
     rows, columns = linear_sum_assignment(cost)
     numbers, names = list(clouds), list(known)
@@ -151,7 +163,9 @@ def _assigned(
     return {numbers[r]: names[c] for r, c in pairs if cost[r, c] < _NEVER}
 
 
-def _cost(cloud: Cloud, known: Known, axis_m: Points, config: PerceptionConfig) -> float:
+def _cost(
+    cloud: Cloud, look: Points | None, known: Known, axis_m: Points, config: PerceptionConfig
+) -> float:
     """How little a detection looks like a known thing; `_NEVER` where it is another."""
     if known.only:
         return 0.0
@@ -167,7 +181,40 @@ def _cost(cloud: Cloud, known: Known, axis_m: Points, config: PerceptionConfig) 
         away = float(np.linalg.norm(here - there))
     else:
         away = float(np.linalg.norm(cloud.centroid_m - known.centroid_m))
-    return away if away <= config.same_place_m else _NEVER
+        far = float(np.linalg.norm(cloud.centroid_m - axis_m))
+        slack = config.same_gap_m + config.same_gap_share * far
+        if known.box_m is not None and _gap_m(cloud, known.box_m) > slack:
+            return _NEVER
+    if away > config.same_place_m:
+        return _NEVER
+    size_m = None if known.box_m is None else np.ptp(known.box_m, axis=0)
+    return away + config.unlike_m * unlike(cloud.high_m - cloud.low_m, look, size_m, known.look)
+
+
+def unlike(
+    size_m: Points, look: Points | None, other_m: Points | None, other: Points | None
+) -> float:
+    """How little two things look alike, about 0 to 2: extents and mean colours, where known."""
+    colour = 0.0 if look is None or other is None else float(np.linalg.norm(look - other))
+    if other_m is None:
+        return colour
+    one, two = (np.sort(np.maximum(e, _LEAST_M)) for e in (size_m, other_m))
+    return colour + float(np.minimum(np.abs(np.log(one / two)).max(), 1.0))
+
+
+def mean_looks(rgb: Rgb, labels: Labels, count: int) -> list[Points | None]:
+    """(3,) mean colour of each label from 0 to 1, None for those that no pixel shows."""
+    thin = labels[::_THIN, ::_THIN].ravel() + 1
+    pixels = np.bincount(thin, minlength=count + 1)[1 : count + 1]
+    colours = rgb[::_THIN, ::_THIN].reshape(-1, 3)
+    sums = [np.bincount(thin, colours[:, c], count + 1)[1 : count + 1] for c in range(3)]
+    mean = np.stack(sums, axis=1) / np.maximum(pixels, 1)[:, None] / 255.0
+    return [m if n else None for m, n in zip(mean, pixels, strict=True)]
+
+
+def _gap_m(cloud: Cloud, box_m: Points) -> float:
+    apart = np.maximum(cloud.low_m - box_m[1], box_m[0] - cloud.high_m)
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
 
 
 def _is_side(cloud: Cloud, known: Known) -> bool:

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from forestall.domain.model import Domain
+from forestall.perception.config import PerceptionConfig
 from forestall.perception.forgetting import Tracks
-from forestall.perception.naming import Known, of_one_piece, unused
+from forestall.perception.naming import Known, of_one_piece, unlike, unused
 from forestall.perception.surfaces import fixed
 from forestall.perception.tracks import Track, View, middle, riding
 from forestall.perception.unproject import Points
@@ -67,7 +68,12 @@ def _away(track: Track, place: Points) -> float:
 
 
 def known(
-    category: str, points_m: Points, centroid_m: Points, domain: Domain, kinds: Collection[str]
+    category: str,
+    points_m: Points,
+    centroid_m: Points,
+    domain: Domain,
+    kinds: Collection[str],
+    look: Points | None = None,
 ) -> Known:
     """Where a thing of a category is expected of which some points are known.
 
@@ -76,7 +82,7 @@ def known(
     if category not in kinds:
         return Known(centroid_m)
     ground = domain.is_a(category, domain.roles.ground)
-    return replace(Known.of(points_m, centroid_m, fixed(domain, category)), only=ground)
+    return replace(Known.of(points_m, centroid_m, fixed(domain, category), look), only=ground)
 
 
 def expected(
@@ -88,7 +94,7 @@ def expected(
     the categories for whose things a name is looked for.
     """
     found = {
-        name: known(t.category, t.points_world_m, t.centroid_m, domain, kinds)
+        name: known(t.category, t.points_world_m, t.centroid_m, domain, kinds, t.look)
         for name, t in tracks.items()
         if t.points_world_m is not None
     }
@@ -103,8 +109,9 @@ def expected(
             offset = at - middle(track)
             for rider in riding(tracks, name):
                 if rider in found:
-                    found[rider] = Known(found[rider].centroid_m + offset, turning=turning)
-            found[name] = Known(at, turning=turning)
+                    there = found[rider].centroid_m + offset
+                    found[rider] = Known(there, turning=turning, look=found[rider].look)
+            found[name] = Known(at, turning=turning, look=track.look)
     return found
 
 
@@ -139,6 +146,7 @@ def settled(
     fresh: Collection[str],
     told: Sequence[tuple[str, Vec3]],
     domain: Domain,
+    config: PerceptionConfig,
 ) -> list[Relation]:
     """Relations once new names have given way to those of lost things, and to what was pointed at.
 
@@ -148,14 +156,20 @@ def settled(
         fresh: named by perception in this observation for the first time.
         told: names that somebody gave to what is at a point.
         domain: tells what does not move.
+        config: how much a thing's look counts.
     """
-    names = _found_again(tracks, fresh, domain)
+    names = _found_again(tracks, fresh, domain, config)
     relations = _renamed(relations, names)
     return _renamed(relations, _pointed_at(tracks, told, domain))
 
 
-def _found_again(tracks: Tracks, fresh: Collection[str], domain: Domain) -> dict[str, str]:
-    """New names → those of lost things of their kind that they must be, which they now bear."""
+def _found_again(
+    tracks: Tracks, fresh: Collection[str], domain: Domain, config: PerceptionConfig
+) -> dict[str, str]:
+    """New names → those of lost things of their kind that they must be, which they now bear.
+
+    Of several that it can be a thing is the one that was nearest, and that looks most like it.
+    """
     names: dict[str, str] = {}
     kinds = {tracks[n].category for n in fresh if n in tracks}
     for category in sorted(k for k in kinds if not domain.is_a(k, domain.roles.fixture)):
@@ -167,7 +181,7 @@ def _found_again(tracks: Tracks, fresh: Collection[str], domain: Domain) -> dict
         ]
         if not lost:
             continue
-        gaps = [[np.linalg.norm(tracks[n].centroid_m - t.centroid_m) for t in lost] for n in new]
+        gaps = [[_unlikely(tracks[n], t, config) for t in lost] for n in new]
         for row, column in zip(*linear_sum_assignment(np.array(gaps)), strict=True):
             names[new[row]] = lost[column].id
     for name, old in names.items():
@@ -176,6 +190,13 @@ def _found_again(tracks: Tracks, fresh: Collection[str], domain: Domain) -> dict
         del tracks[old]
     _rename(tracks, names)
     return names
+
+
+def _unlikely(new: Track, lost: Track, config: PerceptionConfig) -> float:
+    """How little a new thing is likely to be a lost one."""
+    away = float(np.linalg.norm(new.centroid_m - lost.centroid_m))
+    sizes = new.high_m - new.low_m, lost.high_m - lost.low_m
+    return away + config.unlike_far_m * unlike(sizes[0], new.look, sizes[1], lost.look)
 
 
 def _pointed_at(tracks: Tracks, told: Sequence[tuple[str, Vec3]], domain: Domain) -> dict[str, str]:

@@ -19,7 +19,8 @@ from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
 from forestall.perception.gate_config import GateConfig, WatchConfig
 from forestall.perception.gate_time import SenseWatch
-from forestall.perception.naming import Known, name_detections
+from forestall.perception.miscalled import called_right
+from forestall.perception.naming import Known, mean_looks, name_detections
 from forestall.perception.own_names import expected, join_parts, known, named_hands
 from forestall.perception.scope import scope
 from forestall.perception.surfaces import fixed, with_surfaces
@@ -182,15 +183,19 @@ class GraphPerceiver:
         kinds = {d.category for m in masked for d in m.detections if d.instance is None}
         tracks, domain = self._memory.tracks, self._domain
         places = expected(tracks, observation, domain, kinds)
-        axis_m, told = observation.robot_position_world_m, [n for n, _ in observation.told]
+        axis_m = observation.robot_position_world_m
+        used = {*tracks, *(n for n, _ in observation.told)}
         parts: dict[str, str] = {}
         views: list[View] = []
         for frame, masks in zip(observation.frames, masked, strict=True):
-            view = self._view(frame, masks, places, axis_m, told)
-            for name, category, cloud in zip(view.ids, view.categories, view.clouds, strict=True):
+            view = self._view(frame, masks, places, axis_m, used)
+            looks = view.looks or (None,) * len(view.ids)
+            for name, category, cloud, look in zip(
+                view.ids, view.categories, view.clouds, looks, strict=True
+            ):
                 if cloud is not None:
                     points = cloud.points_world_m
-                    seen = known(category, points, cloud.centroid_m, domain, kinds)
+                    seen = known(category, points, cloud.centroid_m, domain, kinds, look)
                     places[name] = places[name].with_view(seen) if name in places else seen
             views.append(view)
             if kinds:
@@ -199,7 +204,8 @@ class GraphPerceiver:
         for part, whole in parts.items():
             if part in tracks:
                 remove(tracks, part, whole)
-        return [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
+        views = [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
+        return called_right(views, tracks, observation.hands, axis_m, domain)
 
     def _view(
         self,
@@ -207,7 +213,7 @@ class GraphPerceiver:
         masks: Masks,
         known: Mapping[str, Known],
         axis_m: Vec3,
-        told: Collection[str],
+        used: Collection[str],
     ) -> View:
         detections, labels = masks.detections, masks.labels
         states = self._estimator.estimate(frame, detections)
@@ -225,7 +231,9 @@ class GraphPerceiver:
                 None if d.score < least else cloud
                 for d, cloud in zip(detections, found, strict=True)
             ]
-        names = name_detections(detections, found, known, axis_m, self._config, told)
+        nameless = any(d.instance is None for d in detections)
+        looks = mean_looks(frame.rgb, labels, len(detections)) if nameless else []
+        names = name_detections(detections, found, known, axis_m, self._config, used, looks)
         return View(
             frame=frame,
             labels=labels,
@@ -238,6 +246,7 @@ class GraphPerceiver:
             guessed=frozenset(
                 n for n, d in zip(names, detections, strict=True) if d.instance is None
             ),
+            looks=tuple(looks),
         )
 
     def _features(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forestall.perception.tracks import View
-from forestall.perception.unproject import Cloud
+from forestall.perception.unproject import Cloud, Points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,17 +25,19 @@ class Sighting:
     cloud: Cloud
     states: Mapping[str, str | None]
     feature: bytes | None
+    look: Points | None = None
 
 
 def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
     """Every located thing's sightings, oldest first."""
     found: dict[str, list[Sighting]] = {}
     for index, view in enumerate(views):
-        for name, category, cloud, states, feature in zip(
-            view.ids, view.categories, view.clouds, view.states, view.features, strict=True
+        looks = view.looks or (None,) * len(view.ids)
+        for name, category, cloud, states, feature, look in zip(
+            view.ids, view.categories, view.clouds, view.states, view.features, looks, strict=True
         ):
             if cloud is not None:
-                sighting = Sighting(index, category, cloud, states, feature)
+                sighting = Sighting(index, category, cloud, states, feature, look)
                 found.setdefault(name, []).append(sighting)
     return found
 

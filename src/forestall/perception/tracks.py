@@ -23,9 +23,12 @@ from forestall.types.observation import Frame, Vec3
 class Track:
     """One object as believed now; `points_world_m` is None when its place is not known.
 
+    `look` is its mean colour, (3,) from 0 to 1, where perception has to tell things apart itself.
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
     view that showed it showed it where it was before, `vague` that it was seen and never located,
-    `presumed` what skills should have made of states since they were read.
+    `presumed` what skills should have made of states since they were read. `sightings` counts the
+    views that showed it, `doubted` is another category that a single view of the newest observation
+    called it.
     """
 
     id: str
@@ -35,16 +38,19 @@ class Track:
     high_m: Points = field(default_factory=lambda: np.zeros(3))
     centroid_m: Points = field(default_factory=lambda: np.zeros(3))
     pixels: int = 0
+    sightings: int = 0
     seen: Seen = Seen.UNOBSERVED
     first_seen_s: float = 0.0
     last_seen_s: float = 0.0
     states: dict[str, str | None] = field(default_factory=dict)
     presumed: dict[str, str] = field(default_factory=dict)
     feature: bytes | None = None
+    look: Points | None = None
     parent: Parent | None = None
     interior_seen: bool = False
     unmoved: bool = False
     vague: bool = False
+    doubted: str | None = None
 
     def move(self, offset_m: Points) -> None:
         """Shift everything that is remembered of its place."""
@@ -66,7 +72,8 @@ class View:
 
     `features` are None without an image encoder and for what has no cloud. `unlocated` tells what
     is seen and has no place, because no depth returned or the segmenter is not sure of its mask.
-    `guessed` are the ids that perception gave, and no segmenter that tracks.
+    `guessed` are the ids that perception gave, and no segmenter that tracks. `looks` are mean
+    colours, empty where every id is a segmenter's.
     """
 
     frame: Frame
@@ -78,6 +85,7 @@ class View:
     features: tuple[bytes | None, ...]
     unlocated: tuple[bool, ...]
     guessed: frozenset[str] = frozenset()
+    looks: tuple[Points | None, ...] = ()
 
 
 def riding(tracks: Mapping[str, Track], name: str | None) -> set[str]:
@@ -96,12 +104,16 @@ _MOST_POINTS = 6000
 
 
 class Fate(IntEnum):
-    """What a view says about a remembered point; of several views the largest counts."""
+    """What a view says about a remembered point; of several views the largest counts.
+
+    Unmasked is a surface where it was, which no mask shows: its detector missed the thing.
+    """
 
     OUT_OF_VIEW = 0
     OCCLUDED = 1
-    GONE = 2
-    CONFIRMED = 3
+    UNMASKED = 2
+    GONE = 3
+    CONFIRMED = 4
 
 
 Fates = npt.NDArray[np.int8]
@@ -137,8 +149,9 @@ def _fates_in(
     fate[known & (depth < z - margin)] = Fate.OCCLUDED
     reached = known & (depth >= z - margin)
     fate[reached] = Fate.GONE
-    same = view.labels[v, u] == own
-    fate[reached & same & (depth <= z + margin)] = Fate.CONFIRMED
+    label, there = view.labels[v, u], reached & (depth <= z + margin)
+    fate[there & (label < 0)] = Fate.UNMASKED
+    fate[there & (label == own)] = Fate.CONFIRMED
     return fate
 
 

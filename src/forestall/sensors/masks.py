@@ -22,13 +22,14 @@ _WRONG = 900  # numbers of things that are not there
 def moved_outlines(ids: Ids, most_px: int, rng: np.random.Generator) -> Ids:
     """Every mask too wide or too narrow by up to so many pixels; later ones lie over earlier."""
     found = ids.copy()
-    present = np.unique(ids[ids >= 0])
-    for i in rng.permutation(present).tolist():
+    if most_px == 0:
+        return found
+    boxes = ndimage.find_objects(ids + 1)
+    for i in rng.permutation(np.unique(ids[ids >= 0])).tolist():
         by = int(rng.integers(-most_px, most_px + 1))
         if by == 0:
             continue
-        box = ndimage.find_objects((ids == i).astype(np.int8))[0]
-        window = tuple(slice(max(0, s.start - most_px), s.stop + most_px) for s in box)
+        window = tuple(slice(max(0, s.start - most_px), s.stop + most_px) for s in boxes[i])
         mask = ids[window] == i
         if by > 0:
             found[window][ndimage.binary_dilation(mask, _SQUARE, iterations=by)] = i
@@ -38,10 +39,10 @@ def moved_outlines(ids: Ids, most_px: int, rng: np.random.Generator) -> Ids:
     return found
 
 
-def without(ids: Ids, share: float, rng: np.random.Generator) -> Ids:
-    """Each mask missing with a probability."""
-    present = np.unique(ids[ids >= 0])
-    gone = present[rng.random(len(present)) < share]
+def without(ids: Ids, share: float, least_px: int, rng: np.random.Generator) -> Ids:
+    """Each mask missing with a probability, and those of fewer pixels always."""
+    present, pixels = np.unique(ids[ids >= 0], return_counts=True)
+    gone = present[(rng.random(len(present)) < share) | (pixels < least_px)]
     found: Ids = np.where(np.isin(ids, gone), np.int32(-1), ids)
     return found
 

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from forestall.errors import InputError, UnknownNameError
 from forestall.sensors.depth import DEPTH_CAMERAS
 from forestall.sensors.masks import miscalled, moved_outlines, without
-from forestall.types.observation import Frame, Observation, Pose, Rgb
+from forestall.types.observation import Depth, Frame, Observation, Pose, Rgb
 
 _MOST_OUTLINE_PX = 20
 
@@ -30,10 +30,12 @@ class Errors:
 
     Args:
         depth: camera: perfect, realsense (stereo), kinect (structured light) or tof.
+        depth_noise: further deviation of depth at 1 m, in metres; it grows with its square.
         pose_cm: root mean square error of the camera's place, for each frame.
         pose_deg: of its direction.
         outline_px: up to how many pixels a mask is too wide or too narrow.
         missed: share of masks that are missing.
+        least_px: masks of fewer pixels are missing, too.
         mislabelled: share of movable things that are called by another category.
         gain: brightness is off by up to this share.
         blur_px: length of motion blur, sideways.
@@ -42,10 +44,12 @@ class Errors:
     """
 
     depth: str = "perfect"
+    depth_noise: float = 0.0
     pose_cm: float = 0.0
     pose_deg: float = 0.0
     outline_px: int = 0
     missed: float = 0.0
+    least_px: int = 0
     mislabelled: float = 0.0
     gain: float = 0.0
     blur_px: int = 0
@@ -58,7 +62,7 @@ class Errors:
         for name in ("missed", "mislabelled", "gain"):
             if not 0 <= getattr(self, name) <= 1:
                 raise InputError(f"{name} of a sensor is a share from 0 to 1")
-        for name in ("pose_cm", "pose_deg", "blur_px", "colour_noise"):
+        for name in ("depth_noise", "pose_cm", "pose_deg", "least_px", "blur_px", "colour_noise"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"{name} of a sensor is 0 or more")
         if not 0 <= self.outline_px <= _MOST_OUTLINE_PX:
@@ -107,9 +111,10 @@ class Sensor:
     def _frame(self, frame: Frame, rng: np.random.Generator) -> Frame:
         errors = self.errors
         depth = DEPTH_CAMERAS[errors.depth](frame.depth_m, frame.intrinsics, rng)
+        depth = _noisy(depth, errors.depth_noise, rng)
         ids, names = frame.instance_ids, frame.instance_names
         if ids is not None:
-            ids = without(ids, errors.missed, rng)
+            ids = without(ids, errors.missed, errors.least_px, rng)
             ids = moved_outlines(ids, errors.outline_px, rng)
             names = miscalled(names, self.labels, errors.mislabelled, rng)
         return replace(
@@ -120,6 +125,15 @@ class Sensor:
             instance_ids=ids,
             instance_names=names,
         )
+
+
+def _noisy(depth_m: Depth, at_1_m: float, rng: np.random.Generator) -> Depth:
+    """Depth with noise that grows with its square, as disparity has it."""
+    if at_1_m == 0:
+        return depth_m
+    noise = rng.standard_normal(depth_m.shape, dtype=np.float32)
+    noisy: Depth = np.maximum(depth_m + np.float32(at_1_m) * depth_m**2 * noise, 0.0)
+    return noisy
 
 
 def _mounted(pose: Pose, errors: Errors, rng: np.random.Generator) -> Pose:

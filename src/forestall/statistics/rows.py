@@ -32,6 +32,8 @@ PLAIN = "4"
 
 TEMPLATES, MODEL, MODEL_PLANS = "templates", "model", "model that plans"
 """Who explains: templates over mined facts, a language model alone, one that plans alone, too."""
+PERFECT = "perfect"
+"""The sensor that was said for all runs; others are looked through besides."""
 
 NOBODY = ("none", "watch", "retry-once")
 """Strategies that judge nothing of what they see, so that model and memory make no difference."""
@@ -49,6 +51,8 @@ class Setup:
         model: of the domain that the monitor reads: "exact", "coarse" or "wrong".
         demonstrations: in its memory: how many, "varied" behind it where people's ways differ.
         reasoning: who explains: `TEMPLATES`, `MODEL` or `MODEL_PLANS`.
+        sensor: what the robot looks through: `PERFECT`, a sensor's name, or errors of the one that
+            was said, such as "outline_px=2".
     """
 
     strategy: str
@@ -59,6 +63,7 @@ class Setup:
     model: str = EXACT
     demonstrations: str = PLAIN
     reasoning: str = TEMPLATES
+    sensor: str = PERFECT
 
     @classmethod
     def of(cls, run: Any) -> Setup:
@@ -72,6 +77,7 @@ class Setup:
             parts += [self.detector, f"{self.threshold:.2f}"]
         parts += [f"without-{self.without}"] if self.without else []
         parts += [self.profile] if self.profile != KIND else []
+        parts += [self.sensor] if self.sensor != PERFECT else []
         if self.strategy not in NOBODY:
             parts += [f"{self.model}-model"] if self.model != EXACT else []
             told = self.demonstrations.replace(" ", "-")
@@ -162,7 +168,7 @@ class EpisodeRow:
         simulated_s: robot time.
         compute_s: measured seconds by phase. `reasoning_s`: those that a robot would spend, too.
         not_judged: moments before a subtask of which the monitor said that nothing was judged.
-        profile: see `Setup`. `model`, `demonstrations`, `reasoning`: likewise.
+        profile: see `Setup`. `model`, `demonstrations`, `reasoning`, `sensor`: likewise.
         slips: how many motions of the robot did not come out as they were meant (truth).
         causes: truth: facts, as text, that are the reason why the run fails without a monitor; see
             `tasks.causes`. Empty if not failing, or where none was found.
@@ -207,6 +213,7 @@ class EpisodeRow:
     profile: str = KIND
     model: str = EXACT
     demonstrations: str = PLAIN
+    sensor: str = PERFECT
     slips: int = 0
     causes: tuple[str, ...] = ()
     reasoning: str = TEMPLATES

@@ -41,6 +41,7 @@ def order(row: EpisodeRow) -> tuple[str | int | float, ...]:
         row.model,
         row.demonstrations,
         row.reasoning,
+        row.sensor,
     )
 
 
