@@ -29,7 +29,6 @@ from forestall.detection.preconditions import PreconditionConfig, PreconditionDe
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
 from forestall.diagnosis.none import NoReasoning
 from forestall.diagnosis.symbolic import SymbolicReasoner
-from forestall.domain.distort import Distortion, distorted
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import (
     CAPTIONER,
@@ -52,21 +51,17 @@ from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.anew import GoalReplanner
 from forestall.replanning.symbolic import PlannerReplanner
-from forestall.seams import Detector, Parts, PlanValidator
-from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge, WholeSceneJudge
+from forestall.seams import Parts, PlanValidator
+from forestall.strategies.judges import DetectorJudge
 from forestall.strategies.online import Online, OnlineScene
 from forestall.strategies.panel import Agree, Panel
 from forestall.strategies.plan_check import PlanChecking
 from forestall.strategies.post_hoc import PostHoc
 from forestall.strategies.proactive import Proactive
-from forestall.strategies.watch import Watch
 from forestall.types.demonstration import Demonstration
 from forestall.types.kind import Settled
 
 S = TypeVar("S")
-
-_NO_FLOOR = 0.01
-"""The paper has no least similarity of two nodes that are matched."""
 
 _SCORE = "score"
 """How the paper's detector is called among judges."""
@@ -177,12 +172,12 @@ def always_held(
         alarm,
         thresholds,
         corrections_of(parts, corrections),
-        knowledge=_knowledge(parts),
+        knowledge=knowledge(parts),
         expectations=parts.part(EXPECTATIONS),
     )
 
 
-def _knowledge(parts: Parts, demonstrations: Sequence[Demonstration] | None = None) -> Knowledge:
+def knowledge(parts: Parts, demonstrations: Sequence[Demonstration] | None = None) -> Knowledge:
     """The counts of the run's memory, or of some demonstrations, and who executes plans."""
     domain = parts.domain
 
@@ -206,7 +201,7 @@ def preconditions(
         violations,
         parts.domain,
         corrections_of(parts, corrections),
-        knowledge=_knowledge(parts),
+        knowledge=knowledge(parts),
         remembered=partial(needed, config=mining),
         expectations=parts.part(EXPECTATIONS),
     )
@@ -319,99 +314,3 @@ def _stepping_in(strategy: Callable[..., S], parts: Parts, max_attempts: int, *m
 def plan_check(parts: Parts, *, max_attempts: int = _PLAN_CHECK) -> PlanChecking:
     """Before each subtask, by the rest of the plan and without demonstrations."""
     return PlanChecking(parts.part(REPLANNER), parts.part(VALIDATOR), max_attempts)
-
-
-def watch(
-    parts: Parts,
-    *,
-    models: tuple[str, ...] = (Distortion.EXACT.value,),
-    model_seed: int = 0,
-    counts: tuple[int, ...] = (),
-) -> Watch:
-    """Every detector, every ablation of the score and the plan check judge, the paper's own first.
-
-    Args:
-        parts: detectors, retriever, reasoner, demonstrations, domain.
-        models: in each of these models of the domain the plan is checked: exact, coarse or wrong.
-        model_seed: of what a wrong model has wrong.
-        counts: the score and the preconditions judge with so many of the demonstrations, too, the
-            first ones by seed.
-    """
-    paper = SceneGraphDetector.name
-    primary = parts.part(DETECTOR, paper, **_shared(parts, paper, calibrated=True))
-    ablated = [
-        parts.part(DETECTOR, paper, **_shared(parts, paper), **{switch: False})
-        for switch in SWITCHES.values()
-    ]
-    others: list[Detector] = [
-        parts.part(DETECTOR, name, **_shared(parts, name, calibrated=True))
-        for name in parts.declared(DETECTOR)
-        if name != paper
-    ]
-    judges: list[Judge] = [
-        *(DetectorJudge(d) for d in (*ablated, *others)),
-        whole_scene(parts),
-        *(_with_model(parts, model, model_seed) for model in models),
-        *(j for n in sorted(set(counts)) for j in _with_few(parts, n)),
-    ]
-    return Watch(parts.part(RETRIEVER), primary, judges, parts.part(REASONER))
-
-
-def whole_scene(parts: Parts) -> WholeSceneJudge:
-    """The paper's equations as they stand, on all that is known: nothing is scoped or left out."""
-    domain = parts.domain
-    literal = ScoreConfig(
-        feature=Feature.TEXT,
-        floor=_NO_FLOOR,
-        subtask_floor=_NO_FLOOR,
-        state_changes_match=True,
-        ignored_attributes=(),
-        predicates=tuple(domain.relations),
-        generic_supports=False,
-        merge_supports=False,
-        instance_categories=(),
-    )
-    paper = SceneGraphDetector.name
-    options = _shared(parts, paper)
-    alarm = DetectorConfig(**{k: v for k, v in options.items() if k == "threshold"})
-    scorer = BatchScorer(literal, parts.part(TEXT_ENCODER), domain)
-    wholes = {(d.id, s.index): s.whole for d in parts.demonstrations for s in d.steps}
-    return WholeSceneJudge(SceneGraphDetector(scorer, alarm), wholes, f"{paper}, whole scene")
-
-
-def _with_model(parts: Parts, model: str, seed: int) -> PlanJudge:
-    domain = distorted(parts.domain, model, seed).domain
-    exact = model == Distortion.EXACT.value
-    name = PlanChecking.name if exact else f"{PlanChecking.name}, {model}"
-    return PlanJudge(GraphValidator(domain), name)
-
-
-def _with_few(parts: Parts, count: int) -> list[DetectorJudge]:
-    """The score and the preconditions with the first demonstrations alone."""
-    if count < 1:
-        raise InputError(f"counts {count}: at least 1 demonstration is needed")
-    first = sorted(parts.demonstrations, key=lambda d: (d.seed, d.id))[:count]
-    retriever = EmbeddingRetriever(first, parts.part(TEXT_ENCODER), parts.domain)
-    told = f"{count} demonstration{'s' if count > 1 else ''}"
-    found = []
-    for name in (SceneGraphDetector.name, PreconditionDetector.name):
-        detector = parts.part(DETECTOR, name, **_shared(parts, name))
-        if isinstance(detector, PreconditionDetector):
-            detector = detector.knowing(_knowledge(parts, first))
-        found.append(DetectorJudge(detector, retriever, f"{name}, {told}"))
-    return found
-
-
-def _shared(parts: Parts, name: str, calibrated: bool = False) -> dict[str, Any]:
-    """Options given to the run's detector that another has, too, the ablations apart.
-
-    A calibration is of one detector with all that it compares with: only the run's own may have it.
-    """
-    known = parts.declared(DETECTOR, name)
-    keeps = calibrated and parts.name(DETECTOR) == name
-    own = (*SWITCHES.values(), *(() if keeps else ("calibration",)))
-    return {
-        option: value
-        for option, value in parts.given(DETECTOR).items()
-        if option in known and option not in own
-    }

@@ -174,7 +174,7 @@ TABLES: Mapping[str, Table] = {
                 "post-hoc": f"{_JUDGING}:post_hoc",
                 "proactive": f"{_JUDGING}:proactive",
                 "retry-once": "forestall.strategies.retry:RetryOnce",
-                "watch": f"{_JUDGING}:watch",
+                "watch": "forestall.assembly.watching:watch",
             },
         ),
     )
