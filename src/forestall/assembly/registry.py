@@ -53,6 +53,7 @@ TABLES: Mapping[str, Table] = {
             kinds.WORLD,
             "kitchen",
             {
+                "ai2thor": "forestall.worlds.ai2thor.part:Thor",
                 "kitchen": "forestall.worlds.kitchen.part:Kitchens",
                 "symbolic": "forestall.testing.part:SymbolicWorlds",
             },
