@@ -69,7 +69,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             kinds.DOMAIN,
             "household",
-            {"bench": f"{_SEEING}:bench", "household": f"{_SEEING}:household"},
+            {name: f"{_SEEING}:{name}" for name in ("ai2thor", "bench", "household")},
         ),
         Table(
             kinds.SEGMENTER,

@@ -9,7 +9,7 @@ from pathlib import Path
 from forestall.worlds.ai2thor.link import Build, Server
 
 STANDIN = Path(__file__).with_name("standin") / "unity.py"
-WIDTH, HEIGHT = 320, 240
+WIDTH, HEIGHT = 240, 180
 SCENE = "FloorPlan1"
 DRY_SCENE = "FloorPlan2"
 """The same kitchen, in which running water reaches nothing."""

@@ -52,7 +52,10 @@ def draw(
     origin = np.asarray(eye, dtype=float)
     u = (np.arange(width) - (width - 1) / 2) / focal
     v = (np.arange(height) - (height - 1) / 2) / focal
-    rays = forward + u[None, :, None] * right - v[:, None, None] * up
+    with np.errstate(divide="ignore"):
+        inverse = [
+            1.0 / (forward[i] + u[None, :] * right[i] - v[:, None] * up[i]) for i in range(3)
+        ]
     depth = np.full((height, width), FAR_M, dtype=np.float64)
     owner = np.full((height, width), -1, dtype=np.int32)
     rgb = np.full((height, width, 3), 235, dtype=np.uint8)
@@ -62,18 +65,23 @@ def draw(
         if window is None:
             continue
         rows, columns = window
-        ray = rays[rows, columns]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = low / ray, high / ray
-        first, last = np.fmin(a, b), np.fmax(a, b)
-        enters, leaves = first.max(axis=-1), last.min(axis=-1)
+        first, leaves = [], None
+        with np.errstate(invalid="ignore"):
+            for i in range(3):
+                rate = inverse[i][rows, columns]
+                a, b = low[i] * rate, high[i] * rate
+                first.append(np.fmin(a, b))
+                last = np.fmax(a, b)
+                leaves = last if leaves is None else np.minimum(leaves, last)
+        enters = np.maximum(np.maximum(first[0], first[1]), first[2])
         hit = (enters <= leaves) & (enters > NEAR_M) & (enters < depth[rows, columns])
         if not hit.any():
             continue
-        shade = _LIGHT[first.argmax(axis=-1)][..., None] * np.asarray(part.colour)
+        face = np.where(enters == first[0], 0, np.where(enters == first[1], 1, 2))[hit]
+        shade = _LIGHT[face][:, None] * np.asarray(part.colour)
         depth[rows, columns][hit] = enters[hit]
         owner[rows, columns][hit] = part.owner
-        rgb[rows, columns][hit] = shade[hit].astype(np.uint8)
+        rgb[rows, columns][hit] = shade.astype(np.uint8)
     return rgb, depth.astype(np.float32), owner
 
 
