@@ -42,8 +42,8 @@ TABLES = ("CoffeeTable", "Desk", "SideTable")
 SUPPORTS = ("Dresser", "ShelvingUnit")
 HEAD = """# The household over AI2-THOR's object types: {count} categories for the world ai2thor.
 # Made by tests/worlds/ai2thor/make_domain.py from the flags, median sizes and parents of every
-# object of AI2-THOR 5.0's 120 rooms, its documentation's table of properties and receptacles, and the
-# package's. A place takes what one of them says that it takes, or the household's file.
+# object of AI2-THOR 5.0's 120 rooms, its documentation's table of properties and receptacles, and
+# the package's. A place takes what one of them says that it takes, or the household's file.
 # What stands above the categories is the household's file; change that one and make this anew.
 
 """
@@ -138,7 +138,10 @@ def _accepted(
     for thing in names:
         about, there = told.get(thing, {}), seen.get(thing, {})
         loose = there.get("pickupable") or thing == "HousePlant"
-        places = {*about.get("compatible_receptacles", ()), *(there.get("parents", ()) if loose else ())}
+        places = {
+            *about.get("compatible_receptacles", ()),
+            *(there.get("parents", ()) if loose else ()),
+        }
         both = household.find(name) is not None and household.find(thing) is not None
         if places & set(parts) or (both and household.accepts(name, thing)):
             found.add(thing)

@@ -39,7 +39,9 @@ def test_a_camera_looks_where_theirs_looks(
 
 
 def test_down_is_down_in_the_picture() -> None:
-    assert camera_pose({"x": 0.0, "y": 0.0, "z": 0.0}, 30.0, 0.0)[:3, 1] == pytest.approx([0, 0, -1])
+    assert camera_pose({"x": 0.0, "y": 0.0, "z": 0.0}, 30.0, 0.0)[:3, 1] == pytest.approx(
+        [0, 0, -1]
+    )
 
 
 @pytest.mark.parametrize(("yaw", "horizon"), [(0.0, 0.0), (47.0, 20.0), (300.0, -25.0)])

@@ -17,6 +17,9 @@ FOOD = frozenset(
      "BreadSliced", "LettuceSliced", "PotatoSliced", "TomatoSliced"}
 )  # fmt: skip
 
+SOAKED = frozenset(f for f in FOOD if f.endswith("Sliced")) | {"Bread"}
+"""What running water spoils."""
+
 
 class History:
     """Everything since reset."""
@@ -76,19 +79,28 @@ class History:
         for name in now.things:
             old, new = self._before.states(name), now.states(name)
             place = now.parent(name)
-            if new.get("cooked") == "cooked" and old.get("cooked") == "raw":
+            if (old.get("cooked"), new.get("cooked")) == ("raw", "cooked"):
                 yield from self._cooked(name, now)
             if category_of(name) in FOOD and place is not None:
                 yield from self._arrived(name, place, now)
-            if new.get("filled") == "coffee" and old.get("filled") == "empty":
-                if old.get("dirty") == "dirty" or now.contents(name):
+            if old.get("filled") == "empty" != new.get("filled"):
+                yield from (c for c in now.contents(name) if category_of(c) in FOOD)
+                if new["filled"] == "coffee" and (
+                    old.get("dirty") == "dirty" or now.contents(name)
+                ):
                     yield name
-            if category_of(name) == "CoffeeMachine" and new.get("toggled") == "on":
-                if old.get("toggled") != "on":
-                    yield from (
-                        c for c in now.contents(name)
-                        if self._before.states(c).get("filled") not in (None, "empty")
-                    )  # fmt: skip
+            if new.get("toggled") == "on" != old.get("toggled"):
+                yield from self._turned_on(name, now)
+
+    def _turned_on(self, name: str, now: Scene) -> Iterator[str]:
+        """Coffee brewed into what is full already; bread and slices under running water."""
+        if category_of(name) == "CoffeeMachine":
+            for cup in now.contents(name):
+                if self._before.states(cup).get("filled") not in (None, "empty"):
+                    yield cup
+        if category_of(name) == "Faucet":
+            wet = (n for sink in now.of("Sink") for n in now.within(sink))
+            yield from (n for n in wet if category_of(n) in SOAKED)
 
     def _cooked(self, name: str, now: Scene) -> Iterator[str]:
         vessels = now.ancestors(name)
@@ -100,9 +112,7 @@ class History:
 
     def _arrived(self, name: str, place: str, now: Scene) -> Iterator[str]:
         filled = now.states(place).get("filled", "empty")
-        if filled == "empty" or self._before.parent(name) == place == now.parent(name) and (
-            self._before.states(place).get("filled") == filled
-        ):  # fmt: skip
+        if filled == "empty" or self._before.parent(name) == place:
             return
         yield name
         if filled != "water":

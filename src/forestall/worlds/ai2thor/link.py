@@ -72,7 +72,7 @@ def load_package(name: str = "ai2thor.controller") -> Any:
             return importlib.import_module(name)
     except ImportError as error:
         raise InputError(
-            f"the world ai2thor needs the package ai2thor: pip install 'forestall[ai2thor]' ({error})"
+            f"the world ai2thor needs the package: pip install 'forestall[ai2thor]' ({error})"
         ) from error
 
 
@@ -97,6 +97,7 @@ class Link:
     def _start(self, scene: str) -> Any:
         build = self._build
         wsgi = load_package("ai2thor.wsgi_server").WsgiServer
+        self._controller.start = self._only_once
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             self._controller.__init__(
@@ -115,9 +116,15 @@ class Link:
                 renderInstanceSegmentation=True,
                 visibilityDistance=VISIBLE_M,
             )
-        self._server = self._controller.server
-        self._controller.start = _no_other_build
         return self._controller.last_event
+
+    def _only_once(self, *said: Any, **more: Any) -> Any:
+        """The Controller's `start`; after a crash it would start a build in a scene of its own."""
+        if self._server is not None:
+            raise ForestallError("the build of AI2-THOR has crashed")
+        started = type(self._controller).start(self._controller, *said, **more)
+        self._server = self._controller.server
+        return started
 
     @property
     def event(self) -> Any:
@@ -183,6 +190,8 @@ class Link:
                     answers.put((work(), None))
             except BaseException as error:  # noqa: BLE001  (handed to the caller)
                 answers.put((None, error))
+            if self._server is not None:
+                self._controller.server = self._server  # a crash takes it away
 
         threading.Thread(target=run, name=f"ai2thor {what}", daemon=True).start()
         ends = time.monotonic() + limit_s
@@ -221,8 +230,3 @@ class Link:
 
 VISIBLE_M = 1.5
 """How far the agent reaches: AI2-THOR calls nothing visible that is further away."""
-
-
-def _no_other_build(*_: Any, **__: Any) -> None:
-    """In the place of the Controller's restart of a crashed build, which would be another scene."""
-    raise ForestallError("the build of AI2-THOR has crashed")

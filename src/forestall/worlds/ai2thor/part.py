@@ -73,7 +73,7 @@ class Thor:
         if min(width, height) < 64 or not 10 <= fov_deg <= 150 or min(start_s, answer_s) <= 0:
             raise InputError(
                 f"ai2thor: pictures of {width} by {height} pixels with {fov_deg:g}°, limits of "
-                f"{start_s:g} s and {answer_s:g} s: at least 64 pixels, 10 to 150°, and times above 0"
+                f"{start_s:g} s and {answer_s:g} s: 64 pixels, 10 to 150°, times above 0 are needed"
             )
         self._scene = checked_scene(scene)
         self._build = Build(
@@ -88,9 +88,7 @@ class Thor:
         )
 
     @contextmanager
-    def open(
-        self, needs: SceneNeeds, domain: Domain, remember: bool = False
-    ) -> Iterator[OpenThor]:
+    def open(self, needs: SceneNeeds, domain: Domain, remember: bool = False) -> Iterator[OpenThor]:
         """See the Protocol; a build draws too fast for anything to be remembered."""
         world = ThorWorld(self._build, needs, domain, self._scene)
         try:
@@ -103,5 +101,13 @@ class Thor:
         try:
             load_package()
         except InputError as error:
-            return (Working("the package ai2thor", False, True, str(error), "pip install 'forestall[ai2thor]'"),)
+            return (
+                Working(
+                    "the package ai2thor",
+                    False,
+                    True,
+                    str(error),
+                    "pip install 'forestall[ai2thor]'",
+                ),
+            )
         return (Working("the package ai2thor", True, True, "installed"),)

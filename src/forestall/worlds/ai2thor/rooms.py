@@ -35,5 +35,7 @@ def checked_scene(name: str) -> str:
         InputError: it cannot be one.
     """
     if name and re.fullmatch(r"FloorPlan\w+", name) is None:
-        raise InputError(f"scene {name!r} is none of AI2-THOR: write FloorPlan1 to FloorPlan30, ...")
+        raise InputError(
+            f"scene {name!r} is none of AI2-THOR: write FloorPlan1 to FloorPlan30, ..."
+        )
     return name

@@ -154,7 +154,7 @@ class Agent:
             self._on(where, "FillObjectWithLiquid", fillLiquid=liquid)
         self.focus = where
 
-    # --- what skills are made of -------------------------------------------------------------------
+    # --- what skills are made of ------------------------------------------------------------------
 
     def reach(self, name: str) -> None:
         """Stand where a thing can be handled.
@@ -179,10 +179,11 @@ class Agent:
         switch = scene.knob(name) or name
         if not self._is(switch, "toggleable"):
             raise RefusalError(f"{name} cannot be turned on or off")
-        held = scene.held
-        if on and type_of(scene.things[name]) == "Television":
-            if held is None or category_of(held) != "RemoteControl":
-                raise RefusalError(f"{name} is turned on with the RemoteControl, which is not in the gripper")
+        remote = type_of(scene.things[name]) == "Television"
+        if on and remote and category_of(scene.held or "") != "RemoteControl":
+            raise RefusalError(
+                f"{name} is turned on with the RemoteControl, which is not in the gripper"
+            )
         self._approach(switch)
         if self._is(switch, "isToggled") is not on:
             self._on(switch, "ToggleObjectOn" if on else "ToggleObjectOff")
@@ -242,7 +243,7 @@ class Agent:
 
     def _spoken(self, message: str) -> str:
         """What AI2-THOR says, with our names in the place of its ids."""
-        first = " ".join(message.split("trace:")[0].split())
+        first = " ".join(message.split("trace:", maxsplit=1)[0].split())
         ids = {str(t["objectId"]): n for n, t in self._scene().things.items()}
         for object_id in sorted(ids, key=len, reverse=True):
             first = first.replace(object_id, ids[object_id])
@@ -304,4 +305,3 @@ SKILLS: Mapping[str, Callable[..., None]] = {
     "pour": Agent.pour,
 }
 """Skill of the domain → what does it."""
-

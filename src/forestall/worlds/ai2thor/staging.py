@@ -54,7 +54,9 @@ def chosen(needs: SceneNeeds, things: Sequence[Thing], scene: Scene) -> dict[str
         free = [n for n in here if scene.things[n]["objectId"] not in taken.values()]
         if not free:
             raise SceneError(f"this scene has no {need.category} for {need.id}")
-        best = min(free, key=lambda n: (not _is_there(scene, n, need.places), int(n.split("-")[-1])))
+        best = min(
+            free, key=lambda n: (not _is_there(scene, n, need.places), int(n.split("-")[-1]))
+        )
         taken[need.id] = str(scene.things[best]["objectId"])
     return taken
 
@@ -89,7 +91,7 @@ class Stage:
                 self._block(need.id, need.in_front_of)
 
     def place(self, name: str, place: str) -> bool:
-        """Put a thing on or in a receptacle, opened for it and closed again; whether it is there."""
+        """Put a thing on or in a receptacle, opened for it and closed again; whether it is so."""
         scene: Scene = self._look()
         shut = scene.shut(place)
         if shut and not self.set(place, "open", "open"):

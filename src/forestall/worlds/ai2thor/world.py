@@ -134,9 +134,7 @@ class ThorWorld:
         settle(self._open, self.scene)
         self._base.learn_floor()
         self._start(np.random.default_rng(seed))
-        self._agent = Agent(
-            self._open, self._base, lambda: self.scene, self._domain.canonical
-        )
+        self._agent = Agent(self._open, self._base, lambda: self.scene, self._domain.canonical)
         self._agent.go_on = self._go_on
         self._past = History(self.scene)
 
@@ -270,7 +268,7 @@ class ThorWorld:
         self._happened()
         return done
 
-    # --- what both are made of ---------------------------------------------------------------------
+    # --- what both are made of --------------------------------------------------------------------
 
     @property
     def scene(self) -> Scene:
@@ -362,5 +360,3 @@ def _groups(ways: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
         if not near:
             found.append((yaw, horizon))
     return found[::-1]
-
-

@@ -83,7 +83,10 @@ class Kitchen:
     def do_GetReachablePositions(self, a: dict[str, Any]) -> list[dict[str, float]]:
         steps = np.arange(-2.0, 2.01, GRID_M)
         return [
-            {"x": float(x), "y": 0.9, "z": float(z)} for x in steps for z in steps if self._free(x, z)
+            {"x": float(x), "y": 0.9, "z": float(z)}
+            for x in steps
+            for z in steps
+            if self._free(x, z)
         ]
 
     def do_Teleport(self, a: dict[str, Any]) -> None:
@@ -113,7 +116,9 @@ class Kitchen:
         if thing.type not in place.takes:
             raise ActionError(f"{thing.type} cannot be placed in {place.type}")
         if place.is_("openable") and not place.states.get("isOpen"):
-            raise ActionError("Target openable Receptacle is CLOSED, can't place if target is not open!")
+            raise ActionError(
+                "Target openable Receptacle is CLOSED, can't place if target is not open!"
+            )
         spot = next(iter(self._spots(place, thing)), None)
         if spot is None:
             raise ActionError("No valid positions to place object found")
@@ -155,7 +160,9 @@ class Kitchen:
         thing = self._target(a, "sliceable")
         if thing.id == self.held:
             raise ActionError("target object cannot be sliced while it is held")
-        self._replace(thing, *(("EggCracked", 1) if thing.type == "Egg" else (_SLICES[thing.type], 3)))
+        self._replace(
+            thing, *(("EggCracked", 1) if thing.type == "Egg" else (_SLICES[thing.type], 3))
+        )
 
     def do_BreakObject(self, a: dict[str, Any]) -> None:
         thing = self._target(a, "breakable")
@@ -188,9 +195,7 @@ class Kitchen:
         place = self._target(a | {"forceAction": True}, "receptacle")
         probe = make("Statue", 0.0, 0.0)
         probe.size = (0.02, 0.02, 0.02)
-        return [
-            {"x": x, "y": place.floor_y(), "z": z} for x, _, z in self._spots(place, probe)
-        ]
+        return [{"x": x, "y": place.floor_y(), "z": z} for x, _, z in self._spots(place, probe)]
 
     def do_PlaceObjectAtPoint(self, a: dict[str, Any]) -> None:
         thing, at = self.things[a["objectId"]], a["position"]
@@ -207,12 +212,14 @@ class Kitchen:
         if self.held == thing.id:
             self.held = None
 
-    # --- what actions are made of ------------------------------------------------------------------
+    # --- what actions are made of -----------------------------------------------------------------
 
     def _target(self, a: dict[str, Any], flag: str) -> Thing:
         thing = self.things.get(str(a.get("objectId")))
         if thing is None:
-            raise ActionError(f"objectId: {a.get('objectId')} is not the objectId on any object in the scene!")
+            raise ActionError(
+                f"objectId: {a.get('objectId')} is not the objectId on any object in the scene!"
+            )
         if not thing.is_(flag):
             raise ActionError(f"{thing.id} is not {flag}")
         if not a.get("forceAction") and thing.id not in self.visible and thing.id != self.held:
@@ -222,7 +229,8 @@ class Kitchen:
     def _toggle(self, a: dict[str, Any], on: bool) -> None:
         thing = self._target(a, "toggleable")
         if bool(thing.states.get("isToggled")) is on:
-            raise ActionError(f"can't toggle object {'on if it is already on' if on else 'off if it is already off'}!")
+            how = "on" if on else "off"
+            raise ActionError(f"can't toggle object {how} if it is already {how}!")
         if on and thing.type == "Microwave" and thing.states.get("isOpen"):
             raise ActionError("Target must be closed to Toggle On!")
         thing.states["isToggled"] = on
@@ -263,7 +271,7 @@ class Kitchen:
         del self.things[thing.id]
         thing.states["isSliced"] = True
         self.gone[thing.id] = thing
-        x, y, z = thing.centre
+        x, _, z = thing.centre
         for i in range(count):
             piece = make(
                 kind, x + 0.065 * (i - (count - 1) / 2), z, thing.low[1],
@@ -294,7 +302,8 @@ class Kitchen:
         mine = {thing.id, *(t.id for t in self._contents(thing))}
         return [
             t for t in self.things.values()
-            if t.id not in mine and t.id != self.held and (t.parent is not None or t.type == "Faucet")
+            if t.id not in mine and t.id != self.held
+            and (t.parent is not None or t.type == "Faucet")
         ]  # fmt: skip
 
     def _inside(self, place: Thing, thing: Thing, centre: tuple[float, float, float]) -> bool:
@@ -309,16 +318,19 @@ class Kitchen:
         return all(
             abs(centre[i] - other.centre[i]) < (thing.size[i] + other.size[i]) / 2 - 1e-9
             for i in range(3)
-        ) and not (other.is_("receptacle") and other.floor_y() <= centre[1] - thing.size[1] / 2 + 1e-6
-                   and self._inside(other, thing, centre))  # fmt: skip
+        ) and not (
+            other.is_("receptacle")
+            and other.floor_y() <= centre[1] - thing.size[1] / 2 + 1e-6
+            and self._inside(other, thing, centre)
+        )
 
     def _spots(self, place: Thing, thing: Thing) -> list[tuple[float, float, float]]:
         """Free centres for a thing, the nearest to the agent first."""
         y = place.floor_y() + thing.size[1] / 2 + 0.0005
         found = [(place.centre[0], y, place.centre[2])]
-        if place.type in ("StoveBurner", "Plate", "Toaster", "CoffeeMachine", "Microwave"):
-            if any(t.parent == place.id for t in self.things.values()):
-                return []
+        one = ("StoveBurner", "Plate", "Toaster", "CoffeeMachine", "Microwave")
+        if place.type in one and any(t.parent == place.id for t in self.things.values()):
+            return []
         if place.form == "stand":
             found = [(place.centre[0], y, place.centre[2] - 0.05)]
         elif place.type not in ("StoveBurner", "Plate", "Toaster"):
@@ -336,17 +348,20 @@ class Kitchen:
 
     def _free(self, x: float, z: float) -> bool:
         return abs(x) <= 2.0 and abs(z) <= 2.0 and not any(
-            t.low[0] - BODY_M < x < t.high[0] + BODY_M and t.low[2] - BODY_M < z < t.high[2] + BODY_M
+            t.low[0] - BODY_M < x < t.high[0] + BODY_M
+            and t.low[2] - BODY_M < z < t.high[2] + BODY_M
             for t in self.things.values() if t.parent is None and t.id != self.held
             and t.low[1] < 0.5
         )  # fmt: skip
 
-    # --- what is seen ------------------------------------------------------------------------------
+    # --- what is seen -----------------------------------------------------------------------------
 
     def _look(self) -> None:
         order = list(self.things.values())
         boxes = [FLOOR, *WALLS]
-        parts = [Part(len(order) + i, low, high, (200, 195, 185)) for i, (low, high) in enumerate(boxes)]
+        parts = [
+            Part(len(order) + i, low, high, (200, 195, 185)) for i, (low, high) in enumerate(boxes)
+        ]
         parts += [Part(i, *box) for i, t in enumerate(order) for box in t.boxes()]
         x, y, z = self.place
         eye = (x, y + EYE_M, z)
@@ -366,7 +381,9 @@ class Kitchen:
             if i in pixels:
                 ids[owners == i, :3] = colour
         for i, t in enumerate(order):
-            away = math.hypot(*(max(a - p, p - b, 0.0) for a, p, b in zip(t.low, eye, t.high, strict=True)))
+            away = math.hypot(
+                *(max(a - p, p - b, 0.0) for a, p, b in zip(t.low, eye, t.high, strict=True))
+            )
             if pixels.get(i, 0) >= 4 and away <= VISIBLE_M:
                 self.visible.add(t.id)
         self.ids = ids

@@ -22,7 +22,9 @@ class Thing:
     centre: Vec
     size: Vec
     colour: tuple[int, int, int]
-    form: str = "solid"  # solid, bowl (open above), shell (a door in front), stand (a base and back)
+    form: str = (
+        "solid"  # solid, bowl (open above), shell (a door in front), stand (a base and back)
+    )
     front: tuple[int, int] = (0, -1)
     flags: frozenset[str] = frozenset()
     takes: frozenset[str] = frozenset()
@@ -119,7 +121,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "Tomato": {"size": (0.075, 0.065, 0.075), "colour": (210, 40, 30),
                "flags": "pickupable sliceable"},
     "TomatoSliced": {"size": (0.06, 0.02, 0.06), "colour": (220, 70, 50), "flags": "pickupable"},
-    "Bread": {"size": (0.24, 0.11, 0.11), "colour": (200, 150, 90), "flags": "pickupable sliceable"},
+    "Bread": {"size": (0.24, 0.11, 0.11), "colour": (200, 150, 90),
+              "flags": "pickupable sliceable"},
     "BreadSliced": {"size": (0.10, 0.02, 0.10), "colour": (240, 215, 160),
                     "flags": "pickupable cookable"},
     "Egg": {"size": (0.05, 0.06, 0.05), "colour": (240, 225, 205),
@@ -128,8 +131,10 @@ KINDS: dict[str, dict[str, Any]] = {
                    "flags": "pickupable cookable"},
     "Knife": {"size": (0.28, 0.02, 0.04), "colour": (150, 155, 165), "flags": "pickupable"},
     "RemoteControl": {"size": (0.05, 0.025, 0.18), "colour": (30, 30, 35), "flags": "pickupable"},
-    "HousePlant": {"size": (0.22, 0.40, 0.22), "colour": (40, 140, 50), "flags": "fillable moveable"},
-    "Television": {"size": (0.10, 0.50, 0.80), "colour": (25, 25, 30), "flags": "toggleable moveable"},
+    "HousePlant": {"size": (0.22, 0.40, 0.22), "colour": (40, 140, 50),
+                   "flags": "fillable moveable"},
+    "Television": {"size": (0.10, 0.50, 0.80), "colour": (25, 25, 30),
+                   "flags": "toggleable moveable"},
     "TVStand": {"size": (0.45, 0.50, 1.00), "colour": (120, 85, 60), "flags": "receptacle",
                 "takes": EVERYTHING},
     "CounterTop": {"size": (1.0, 0.90, 0.60), "colour": (170, 165, 155), "flags": "receptacle",
@@ -182,9 +187,7 @@ def kitchen() -> list[Thing]:
     sink = make("Sink", 0.05, 1.90)
     basin = make("SinkBasin", 0.05, 1.84, 0.90, id=f"{sink.id}|SinkBasin")
     burners = [make("StoveBurner", -1.90, z, 0.90) for z in (-0.85, -0.25)]
-    knobs = [
-        make("StoveKnob", -1.57, b.centre[2], 0.80, controls=b.id) for b in reversed(burners)
-    ]
+    knobs = [make("StoveKnob", -1.57, b.centre[2], 0.80, controls=b.id) for b in reversed(burners)]
     fridge = make("Fridge", 1.85, 0.75, front=(-1, 0))
     microwave = make("Microwave", 1.75, 1.92, 0.90, parent=right.id)
     machine = make("CoffeeMachine", -1.95, 1.95, 0.90, parent=left.id)

@@ -104,12 +104,17 @@ def over_wsgi(unity: Unity) -> None:
     mark = "stand-in-boundary"
     while True:
         body = b""
-        texts = {"metadata": json.dumps(unity.metadata()), "token": os.environ["AI2THOR_CLIENT_TOKEN"]}
+        texts = {
+            "metadata": json.dumps(unity.metadata()),
+            "token": os.environ["AI2THOR_CLIENT_TOKEN"],
+        }
         for name, text in texts.items():
-            head = f'Content-disposition: form-data; name="{name}"\r\nContent-Type: text/plain; charset=utf-8'
+            head = f'Content-disposition: form-data; name="{name}"'
+            head += "\r\nContent-Type: text/plain; charset=utf-8"
             body += f"--{mark}\r\n{head}\r\n\r\n{text}\r\n".encode()
         for name, picture in unity.pictures().items():
-            head = f'Content-disposition: form-data; name="{name}"; filename="{name}"\r\nContent-Type: image/raw'
+            head = f'Content-disposition: form-data; name="{name}"; filename="{name}"'
+            head += "\r\nContent-Type: image/raw"
             body += f"--{mark}\r\n{head}\r\n\r\n".encode() + picture + b"\r\n"
         body += f"--{mark}--\r\n".encode()
         kind = f"multipart/form-data; boundary={mark}"
