@@ -27,6 +27,9 @@ from forestall.errors import ForestallError, InputError
 _LOOK_S, _GRACE_S = 0.1, 1.0
 _LOG = "~/.ai2thor/log/unity.log"
 
+VISIBLE_M = 1.5
+"""How far the agent reaches: AI2-THOR calls nothing visible that is further away."""
+
 
 class Server(Enum):
     """How the Controller and the build talk."""
@@ -226,7 +229,3 @@ class Link:
         process = getattr(server, "unity_proc", None)
         code: int | None = None if process is None else process.poll()
         return code
-
-
-VISIBLE_M = 1.5
-"""How far the agent reaches: AI2-THOR calls nothing visible that is further away."""

@@ -96,7 +96,7 @@ class Stage:
         shut = scene.shut(place)
         if shut and not self.set(place, "open", "open"):
             return False
-        done = any(self._at(name, point) for point in self._points(place))
+        done = any(self._at(name, point) for point in self._points(place)[:POINTS])
         if shut:
             self.set(place, "open", "closed")
         return done and self._look().parent(name) == place
@@ -144,7 +144,8 @@ class Stage:
         at = point_from_thor(scene.things[names[0]]["position"])
         floor = self._link.step("GetReachablePositions").metadata["actionReturn"] or []
         comes = min((point_from_thor(p) for p in floor), key=lambda p: _flat(p, at), default=at)
-        for point in sorted(self._points(place), key=lambda p: _flat(p, _between(at, comes))):
+        before = sorted(self._points(place), key=lambda p: _flat(p, _between(at, comes)))
+        for point in before[: 4 * POINTS]:
             if self._at(front, point):
                 return
         raise SceneError(f"AI2-THOR finds no room for {front} in front of {behind}")
@@ -158,7 +159,7 @@ class Stage:
         )
         found = [point_from_thor(p) for p in event.metadata["actionReturn"] or ()]
         box = thing["axisAlignedBoundingBox"]["center"]
-        return sorted(found, key=lambda p: _flat(p, point_from_thor(box)))[: 4 * POINTS]
+        return sorted(found, key=lambda p: _flat(p, point_from_thor(box)))
 
     def _at(self, name: str, point: tuple[float, float, float]) -> bool:
         thing = self._look().things[name]
