@@ -1,4 +1,4 @@
-"""A build that dies, hangs or never starts: said clearly, in time, and nothing goes on behind it."""
+"""A build that dies, hangs or never starts: said clearly and in time; nothing goes on behind it."""
 
 import time
 from pathlib import Path

@@ -1,6 +1,7 @@
 """A scene as a world: what a task needs in it, what faults do to it, what it remembers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,10 @@ def staged(tmp_path: Path) -> Iterator[Any]:
     yield make
     for world in made:
         world.close()
+
+
+def _states(made: list[ThorWorld], name: str) -> Mapping[str, str]:
+    return made[0].oracle.states(name)
 
 
 def _at(world: ThorWorld, name: str) -> str | None:
@@ -200,7 +205,7 @@ def test_the_world_conforms_at_its_level_and_perception_sees_what_was_done(tmp_p
         made.append(ThorWorld(build(tmp_path), SceneNeeds(), DOMAIN, SCENE))
         return made[-1]
 
-    estimator = OracleStateEstimator(lambda n: made[0].oracle.states(n), DOMAIN)
+    estimator = OracleStateEstimator(partial(_states, made), DOMAIN)
     perceiver = GraphPerceiver(InstanceSegmenter(), estimator, DOMAIN)
     assert check_environment(make, 2, STEPS, DOMAIN, Level.TOLERANCE, perceiver=perceiver) == []
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from forestall.errors import SceneError
 from forestall.types.facts import category_of, is_instance
+from forestall.types.observation import Vec3
 from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.worlds.ai2thor.frames import point_from_thor, point_to_thor
 from forestall.worlds.ai2thor.link import Link
@@ -19,6 +20,9 @@ from forestall.worlds.ai2thor.scene import Scene
 
 POINTS = 30
 """Places on one receptacle that are tried for a thing."""
+
+ROOM_M = 0.25
+"""More room around a thing is not looked for."""
 
 SUPPORTS = ("CounterTop", "DiningTable", "SideTable", "CoffeeTable", "Desk", "TVStand", "Dresser")
 """Where a thing goes that may lie anywhere and is shut in, in this order."""
@@ -124,9 +128,8 @@ class Stage:
 
     def _put_as_needed(self, need: ObjectNeed) -> None:
         scene: Scene = self._look()
-        if _is_there(scene, need.id, need.places) and scene.closed_around(need.id) is None:
-            return
-        if need.places and _is_there(scene, need.id, need.places):
+        shut_in = not need.places and scene.closed_around(need.id) is not None
+        if _is_there(scene, need.id, need.places) and not shut_in:
             return
         for place in self.options(need.places or SUPPORTS):
             if self.place(need.id, place):
@@ -142,15 +145,14 @@ class Stage:
         if place is None:
             raise SceneError(f"{front} is to stand in front of {behind}, which stands nowhere")
         at = point_from_thor(scene.things[names[0]]["position"])
-        floor = self._link.step("GetReachablePositions").metadata["actionReturn"] or []
-        comes = min((point_from_thor(p) for p in floor), key=lambda p: _flat(p, at), default=at)
+        comes = min(self._floor(), key=lambda p: _flat(p, at), default=at)
         before = sorted(self._points(place), key=lambda p: _flat(p, _between(at, comes)))
         for point in before[: 4 * POINTS]:
             if self._at(front, point):
                 return
         raise SceneError(f"AI2-THOR finds no room for {front} in front of {behind}")
 
-    def _points(self, place: str) -> list[tuple[float, float, float]]:
+    def _points(self, place: str) -> list[Vec3]:
         thing = self._look().receptacle(place)
         if thing is None:
             return []
@@ -158,10 +160,23 @@ class Stage:
             "GetSpawnCoordinatesAboveReceptacle", objectId=thing["objectId"], anywhere=True
         )
         found = [point_from_thor(p) for p in event.metadata["actionReturn"] or ()]
-        box = thing["axisAlignedBoundingBox"]["center"]
-        return sorted(found, key=lambda p: _flat(p, point_from_thor(box)))
+        scene: Scene = self._look()
+        there = [point_from_thor(scene.things[n]["position"]) for n in scene.contents(place)]
+        floor = self._floor()
 
-    def _at(self, name: str, point: tuple[float, float, float]) -> bool:
+        def worse(point: Vec3) -> tuple[float, float]:
+            """Near to other things; then far from where one stands."""
+            room = min((_flat(point, t) for t in there), default=ROOM_M**2)
+            return -min(room, ROOM_M**2), min((_flat(point, f) for f in floor), default=0.0)
+
+        return sorted(found, key=worse)
+
+    def _floor(self) -> list[Vec3]:
+        """Where the agent can stand."""
+        found = self._link.step("GetReachablePositions").metadata["actionReturn"] or []
+        return [point_from_thor(p) for p in found]
+
+    def _at(self, name: str, point: Vec3) -> bool:
         thing = self._look().things[name]
         return self._did(
             "PlaceObjectAtPoint", objectId=thing["objectId"], position=point_to_thor(point)

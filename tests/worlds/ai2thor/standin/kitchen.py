@@ -21,7 +21,8 @@ SCENES = ("FloorPlan1_physics", "FloorPlan2_physics")
 LAZY = SCENES[1]
 """The scene in which running water reaches nothing, as it may miss things in a real one."""
 
-_SLICES = {"Potato": "PotatoSliced", "Tomato": "TomatoSliced", "Bread": "BreadSliced"}
+_SLICES = {"Potato": "PotatoSliced", "Tomato": "TomatoSliced", "Bread": "BreadSliced",
+           "Lettuce": "LettuceSliced"}  # fmt: skip
 _HEATERS = ("Microwave", "StoveBurner", "Toaster", "CoffeeMachine")
 
 
@@ -351,7 +352,7 @@ class Kitchen:
             t.low[0] - BODY_M < x < t.high[0] + BODY_M
             and t.low[2] - BODY_M < z < t.high[2] + BODY_M
             for t in self.things.values() if t.parent is None and t.id != self.held
-            and t.low[1] < 0.5
+            and t.low[1] < 0.6
         )  # fmt: skip
 
     # --- what is seen -----------------------------------------------------------------------------
@@ -382,8 +383,8 @@ class Kitchen:
                 ids[owners == i, :3] = colour
         for i, t in enumerate(order):
             away = math.hypot(
-                *(max(a - p, p - b, 0.0) for a, p, b in zip(t.low, eye, t.high, strict=True))
-            )
+                *(max(t.low[k] - eye[k], eye[k] - t.high[k], 0.0) for k in (0, 2))
+            )  # AI2-THOR looks for colliders in a capsule from the eye down to the floor
             if pixels.get(i, 0) >= 4 and away <= VISIBLE_M:
                 self.visible.add(t.id)
         self.ids = ids

@@ -121,6 +121,12 @@ KINDS: dict[str, dict[str, Any]] = {
     "Tomato": {"size": (0.075, 0.065, 0.075), "colour": (210, 40, 30),
                "flags": "pickupable sliceable"},
     "TomatoSliced": {"size": (0.06, 0.02, 0.06), "colour": (220, 70, 50), "flags": "pickupable"},
+    "Lettuce": {"size": (0.15, 0.12, 0.15), "colour": (90, 180, 70),
+                "flags": "pickupable sliceable"},
+    "LettuceSliced": {"size": (0.06, 0.02, 0.07), "colour": (150, 210, 110),
+                      "flags": "pickupable"},
+    "Laptop": {"size": (0.32, 0.03, 0.22), "colour": (60, 60, 70),
+               "flags": "pickupable openable toggleable breakable"},
     "Bread": {"size": (0.24, 0.11, 0.11), "colour": (200, 150, 90),
               "flags": "pickupable sliceable"},
     "BreadSliced": {"size": (0.10, 0.02, 0.10), "colour": (240, 215, 160),
@@ -148,7 +154,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "Microwave": {"size": (0.52, 0.32, 0.42), "colour": (80, 80, 90), "form": "shell",
                   "flags": "receptacle openable toggleable moveable",
                   "takes": (FOOD | CROCKERY) - {"Lettuce"}},
-    "Fridge": {"size": (0.60, 1.60, 0.70), "colour": (215, 220, 225), "form": "shell",
+    "Fridge": {"size": (0.60, 1.10, 0.70), "colour": (215, 220, 225), "form": "shell",
                "flags": "receptacle openable cold", "takes": EVERYTHING - {"Knife"}},
     "Toaster": {"size": (0.24, 0.19, 0.20), "colour": (190, 60, 55), "form": "bowl",
                 "flags": "receptacle toggleable moveable", "takes": {"BreadSliced"}},
@@ -186,26 +192,30 @@ def kitchen() -> list[Thing]:
     stand = make("TVStand", 1.95, -0.40)
     sink = make("Sink", 0.05, 1.90)
     basin = make("SinkBasin", 0.05, 1.84, 0.90, id=f"{sink.id}|SinkBasin")
-    burners = [make("StoveBurner", -1.90, z, 0.90) for z in (-0.85, -0.25)]
-    knobs = [make("StoveKnob", -1.57, b.centre[2], 0.80, controls=b.id) for b in reversed(burners)]
-    fridge = make("Fridge", 1.85, 0.75, front=(-1, 0))
+    burners = [make("StoveBurner", x, z, 0.90) for x in (-1.75, -2.02) for z in (-0.85, -0.30)]
+    knobs = [
+        make("StoveKnob", -1.57, z, 0.80, controls=b.id)
+        for b, z in zip(burners, (-0.20, -0.40, -0.60, -0.80), strict=True)
+    ]
+    fridge = make("Fridge", 1.85, 0.75, 0.45, front=(-1, 0))
     microwave = make("Microwave", 1.75, 1.92, 0.90, parent=right.id)
     machine = make("CoffeeMachine", -1.95, 1.95, 0.90, parent=left.id)
     toaster = make("Toaster", -1.55, 1.95, 0.90, parent=left.id)
     top = {"y": 0.90, "parent": left.id}
     other = {"y": 0.90, "parent": right.id}
     on_table = {"y": 0.75, "parent": table.id}
-    pan = make("Pan", -1.90, -0.85, 0.93, parent=burners[0].id)
+    pan = make("Pan", -1.75, -0.85, 0.93, parent=burners[0].id)
     found = [
         left, right, stove, table, stand, sink, basin, *burners, *knobs, fridge, microwave,
         machine, toaster, make("Faucet", 0.05, 2.13, 0.90), pan,
         make("Plate", 0.65, 1.80, **other), make("Potato", 1.00, 1.75, **other),
         make("Bowl", 1.30, 1.80, **other),
         make("Mug", -1.20, 1.75, **top), make("Knife", -0.85, 1.72, **top),
-        make("Bread", -0.85, 1.95, **top), make("Egg", -0.55, 1.75, **top),
-        make("Pot", -0.50, 2.00, **top),
+        make("Bread", -0.85, 1.95, **top), make("Egg", -0.42, 1.72, **top),
+        make("Pot", -0.60, 2.02, **top),
         make("WineBottle", 0.00, -1.55, **on_table), make("HousePlant", 0.60, -1.60, **on_table),
-        make("Statue", 0.25, -1.75, **on_table),
+        make("Statue", 0.25, -1.75, **on_table), make("Lettuce", -0.05, -1.80, **on_table),
+        make("Laptop", 1.90, -0.10, 0.50, parent=stand.id),
         make("Tomato", 1.85, 0.75, fridge.floor_y(), parent=fridge.id),
         make("Television", 1.98, -0.40, 0.50, parent=stand.id),
         make("RemoteControl", 1.80, -0.75, 0.50, parent=stand.id),
