@@ -98,7 +98,7 @@ class Base:
         ways = self._ways(here)
         places = [p for p in self._floor if _cell(p[0], p[2]) in ways] or self._floor
         places = [p for p in places if _away_m(box, p[0], p[2]) <= VISIBLE_M - 0.1]
-        best = sorted(places, key=lambda p: (abs(_away_m(box, p[0], p[2]) - BEST_M), p))
+        best = sorted(places, key=lambda p: (_awkward(box, p[0], p[2]), p))
         seconds = 0.0
         for place in best[:TRIES]:
             if not self._stand(place, box):
@@ -149,6 +149,15 @@ def turning_s(before_deg: float, after_deg: float) -> float:
 
 def _cell(x: float, z: float) -> tuple[int, int]:
     return round(x / GRID_M), round(z / GRID_M)
+
+
+def _awkward(box: Box, x: float, y: float) -> float:
+    """How badly one handles a thing from a place: too near, too far, or at a slant.
+
+    What opens shows its inside to one who stands straight before it.
+    """
+    aside = min(abs(box.centre[0] - x), abs(box.centre[1] - y))
+    return abs(_away_m(box, x, y) - BEST_M) + 0.5 * aside
 
 
 def _away_m(box: Box, x: float, y: float) -> float:
