@@ -1,6 +1,6 @@
 """What there is in the stand-in's kitchen: boxes with the flags and states of AI2-THOR's objects.
 
-Facts and forms only; `kitchen` moves and changes them. Coordinates are AI2-THOR's.
+Facts and forms only; `box_kitchen` moves and changes them. Coordinates are AI2-THOR's.
 """
 
 from __future__ import annotations
@@ -201,9 +201,9 @@ def kitchen() -> list[Thing]:
     microwave = make("Microwave", 1.75, 1.92, 0.90, parent=right.id)
     machine = make("CoffeeMachine", -1.95, 1.95, 0.90, parent=left.id)
     toaster = make("Toaster", -1.55, 1.95, 0.90, parent=left.id)
-    top = {"y": 0.90, "parent": left.id}
-    other = {"y": 0.90, "parent": right.id}
-    on_table = {"y": 0.75, "parent": table.id}
+    top: dict[str, Any] = {"y": 0.90, "parent": left.id}
+    other: dict[str, Any] = {"y": 0.90, "parent": right.id}
+    on_table: dict[str, Any] = {"y": 0.75, "parent": table.id}
     pan = make("Pan", -1.75, -0.85, 0.93, parent=burners[0].id)
     found = [
         left, right, stove, table, stand, sink, basin, *burners, *knobs, fridge, microwave,

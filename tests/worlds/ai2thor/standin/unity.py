@@ -18,7 +18,7 @@ from collections import Counter
 from typing import Any, BinaryIO
 
 import numpy as np
-from kitchen import Kitchen
+from box_kitchen import Kitchen
 
 _METADATA, _ACTION, _RGB, _DEPTH, _IDS, _END = 1, 2, 4, 5, 9, 255
 _HEADER = "!BI"

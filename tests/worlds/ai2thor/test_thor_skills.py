@@ -1,15 +1,19 @@
 """Every skill through the real Controller, against the stand-in for its Unity side."""
 
+from collections.abc import Iterator
+
 import pytest
+from builds import leaves_files_open, needs_package, opened
 
 from forestall.domain.load import shipped
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
+from forestall.worlds.ai2thor.link import Server
 from forestall.worlds.ai2thor.skills import SKILLS
 from forestall.worlds.ai2thor.world import ThorWorld
 
-pytestmark = pytest.mark.filterwarnings("ignore")  # the package leaves files and sockets open
+pytestmark = [needs_package, leaves_files_open]
 
 PLAN: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("navigate_to_obj(Mug)", ()),
@@ -37,6 +41,20 @@ PLAN: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("pick_up(Pan)", ("held_by(Pan-1, gripper)", "inside(EggCracked-1, Pan-1)")),
     ("put_on(Pan, StoveBurner-1)", ("on_top_of(Pan-1, StoveBurner-1)",)),
 )
+
+
+@pytest.fixture(scope="module", params=list(Server), ids=lambda s: s.value)
+def any_world(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[ThorWorld]:
+    with opened(tmp_path_factory.mktemp("build"), request.param) as world:
+        yield world
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ThorWorld]:
+    with opened(tmp_path_factory.mktemp("build")) as world:
+        yield world
 
 
 def _holds(world: ThorWorld, text: str) -> bool:

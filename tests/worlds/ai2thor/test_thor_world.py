@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builds import DRY_SCENE, SCENE, build
+from builds import DRY_SCENE, SCENE, at_home, build, leaves_files_open, needs_package, opened
 
 from forestall.domain.load import shipped
 from forestall.errors import SceneError, UnknownNameError
@@ -22,11 +22,15 @@ from forestall.types.scene import ObjectNeed, SceneNeeds
 from forestall.worlds.ai2thor.rooms import scenes
 from forestall.worlds.ai2thor.world import ThorWorld
 
-pytest.importorskip("ai2thor", reason="the package ai2thor is not installed")
-
-pytestmark = pytest.mark.filterwarnings("ignore")  # the package leaves files and sockets open
+pytestmark = [needs_package, leaves_files_open]
 
 DOMAIN = shipped("ai2thor")
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ThorWorld]:
+    with opened(tmp_path_factory.mktemp("build")) as world:
+        yield world
 
 
 @pytest.fixture
@@ -39,7 +43,8 @@ def staged(tmp_path: Path) -> Iterator[Any]:
         made[-1].reset(0)
         return made[-1]
 
-    yield make
+    with at_home(tmp_path):
+        yield make
     for world in made:
         world.close()
 
@@ -93,7 +98,10 @@ def test_one_thing_stands_before_another(staged: Any) -> None:
 def test_a_scene_that_has_not_what_is_needed_does_not_do(tmp_path: Path) -> None:
     needs = SceneNeeds(objects=(ObjectNeed("Kettle-1", "Kettle"),))
     world = ThorWorld(build(tmp_path), needs, DOMAIN, SCENE)
-    with pytest.raises(SceneError, match="FloorPlan1: this scene has no Kettle for Kettle-1"):
+    with (
+        at_home(tmp_path),
+        pytest.raises(SceneError, match="FloorPlan1: this scene has no Kettle for Kettle-1"),
+    ):
         world.reset(0)
     world.close()
 
@@ -207,11 +215,14 @@ def test_the_world_conforms_at_its_level_and_perception_sees_what_was_done(tmp_p
 
     estimator = OracleStateEstimator(partial(_states, made), DOMAIN)
     perceiver = GraphPerceiver(InstanceSegmenter(), estimator, DOMAIN)
-    assert check_environment(make, 2, STEPS, DOMAIN, Level.TOLERANCE, perceiver=perceiver) == []
+    with at_home(tmp_path):
+        found = check_environment(make, 2, STEPS, DOMAIN, Level.TOLERANCE, perceiver=perceiver)
+    assert found == []
 
 
 def test_the_stand_in_repeats_to_the_last_bit(tmp_path: Path) -> None:
     def make() -> ThorWorld:
         return ThorWorld(build(tmp_path), SceneNeeds(), DOMAIN, SCENE)
 
-    assert check_environment(make, 5, STEPS[:2], DOMAIN) == []
+    with at_home(tmp_path):
+        assert check_environment(make, 5, STEPS[:2], DOMAIN) == []

@@ -1,18 +1,35 @@
 """Pictures of the stand-in through the real Controller: they show things where they are."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from builds import leaves_files_open, needs_package, opened
 
 from forestall.types.observation import Frame
 from forestall.types.plan import Subtask
 from forestall.worlds.ai2thor.frames import box_from_thor, point_from_thor
+from forestall.worlds.ai2thor.link import Server
 from forestall.worlds.ai2thor.world import ThorWorld
 
-pytestmark = pytest.mark.filterwarnings("ignore")  # the package leaves files and sockets open
+pytestmark = [needs_package, leaves_files_open]
 
 CM = 0.01
+
+
+@pytest.fixture(scope="module", params=list(Server), ids=lambda s: s.value)
+def any_world(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[ThorWorld]:
+    with opened(tmp_path_factory.mktemp("build"), request.param) as world:
+        yield world
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ThorWorld]:
+    with opened(tmp_path_factory.mktemp("build")) as world:
+        yield world
 
 
 def _points(frame: Frame, name: str) -> Any:

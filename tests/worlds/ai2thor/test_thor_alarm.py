@@ -1,9 +1,10 @@
 """From alarm to success through the whole of it: Controller, perception, plan check, repair."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from builds import SCENE, executable
+from builds import SCENE, at_home, executable, leaves_files_open, needs_package
 
 from forestall.assembly.configuration import run_config
 from forestall.assembly.make import prepare, run_episode
@@ -12,12 +13,13 @@ from forestall.errors import InputError
 from forestall.types.decision import Outcome
 from forestall.types.episode import EpisodeEnd, EpisodeRecord
 
-pytest.importorskip("ai2thor", reason="the package ai2thor is not installed")
+pytestmark = [pytest.mark.slow, needs_package, leaves_files_open]
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.filterwarnings("ignore"),  # the package leaves files and sockets open
-]
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path) -> Iterator[None]:
+    with at_home(tmp_path):
+        yield
 
 
 def _run(folder: Path, task: str, scenario: str | None, server: str, *said: str) -> EpisodeRecord:

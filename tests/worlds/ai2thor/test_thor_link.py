@@ -1,10 +1,11 @@
 """A build that dies, hangs or never starts: said clearly and in time; nothing goes on behind it."""
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from builds import SCENE, WIDTH, build
+from builds import SCENE, WIDTH, at_home, build, leaves_files_open, needs_package
 
 from forestall.domain.load import shipped
 from forestall.errors import ForestallError, InputError
@@ -14,11 +15,15 @@ from forestall.types.scene import SceneNeeds
 from forestall.worlds.ai2thor.link import Build, Link, Server
 from forestall.worlds.ai2thor.world import ThorWorld
 
-pytest.importorskip("ai2thor", reason="the package ai2thor is not installed")
-
-pytestmark = pytest.mark.filterwarnings("ignore")  # the package leaves files and sockets open
+pytestmark = [needs_package, leaves_files_open]
 
 BOTH = pytest.mark.parametrize("server", list(Server), ids=lambda s: s.value)
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path) -> Iterator[None]:
+    with at_home(tmp_path):
+        yield
 
 
 @BOTH
