@@ -135,7 +135,7 @@ def test_a_burner_is_on_while_its_knob_is() -> None:
 
 
 def test_what_is_in_something_closed_is_closed_in() -> None:
-    door = {"receptacle": True, "openable": True}
+    door: dict[str, Any] = {"receptacle": True, "openable": True}
     shut = _scene(_thing("Fridge|1", **door), _thing("Egg|1", "Fridge|1"))
     assert shut.closed_around("Egg-1") == "Fridge-1"
     ajar = _scene(_thing("Fridge|1", isOpen=True, **door), _thing("Egg|1", "Fridge|1"))
@@ -143,7 +143,7 @@ def test_what_is_in_something_closed_is_closed_in() -> None:
 
 
 def test_what_running_devices_leave_undone_is_named() -> None:
-    on = {"toggleable": True, "isToggled": True}
+    on: dict[str, Any] = {"toggleable": True, "isToggled": True}
     scene = _scene(
         _thing("Microwave|1", receptacle=True, **on),
         _thing("Potato|1", "Microwave|1", cookable=True),

@@ -122,7 +122,8 @@ class ThorWorld:
                 self.close()
                 self._link = Link(self._build, scene)
         self._base = Base(self._link)
-        self._cached, self._time_s, self._released = None, 0.0, None
+        self._cached, self._time_s = None, 0.0
+        self._released: tuple[str, Vec3] | None = None
 
     def _set(self, seed: int) -> None:
         things = self._open.event.metadata["objects"]

@@ -416,7 +416,8 @@ class Kitchen:
                 "activeAgentId": 0}  # fmt: skip
 
     def _object(self, t: Thing) -> dict[str, Any]:
-        chain, parent = [], t.parent
+        chain: list[str] = []
+        parent = t.parent
         while parent is not None:
             chain.insert(0, parent)
             parent = self.things[parent].parent
