@@ -40,14 +40,15 @@ def unseen(
         graph = perceiver.perceive(environment.observe(_points(graph, subtask)))
         before = State.from_graph(graph, domain)
         outcome = environment.execute(subtask)
-        if outcome.status is not SkillStatus.SUCCEEDED:
+        done = outcome.status is SkillStatus.SUCCEEDED
+        acted = getattr(perceiver, "acted", None)
+        if acted is not None:
+            acted(subtask, done)
+        if not done:
             continue
         expected = _expected(before, subtask)
         if isinstance(expected, str):
             yield f"{subtask} was done; on the scene as perceived before it cannot be: {expected}"
-        acted = getattr(perceiver, "acted", None)
-        if acted is not None:
-            acted(subtask)
         graph = perceiver.perceive(environment.observe(_where(outcome, graph, subtask)))
         if not isinstance(expected, str):
             yield from _not_seen(subtask, expected, graph, domain)
