@@ -23,9 +23,9 @@ PLUGINS = ("domains", "worlds", "testing", "training", "cli")
 
 PLAIN = {
     "open", "on", "off", "closed", "empty", "room", "inside", "whole", "near", "raw", "place",
-    "clean", "within", "above", "below", "behind", "insert", "broken", "in_front_of",
+    "clean", "within", "above", "below", "behind", "insert", "broken", "in_front_of", "Box",
 }  # fmt: skip
-"""Words of English, of JSON keys and of file modes that a domain happens to use, too."""
+"""Words of English, of JSON keys, of file modes and a type of ours that a domain uses, too."""
 
 
 def names_of(domain: Domain) -> set[str]:

@@ -53,6 +53,7 @@ TABLES: Mapping[str, Table] = {
             kinds.WORLD,
             "kitchen",
             {
+                "ai2thor": "forestall.worlds.ai2thor.part:Thor",
                 "kitchen": "forestall.worlds.kitchen.part:Kitchens",
                 "symbolic": "forestall.testing.part:SymbolicWorlds",
             },
@@ -68,7 +69,7 @@ TABLES: Mapping[str, Table] = {
         Table(
             kinds.DOMAIN,
             "household",
-            {"bench": f"{_SEEING}:bench", "household": f"{_SEEING}:household"},
+            {name: f"{_SEEING}:{name}" for name in ("ai2thor", "bench", "household")},
         ),
         Table(
             kinds.SEGMENTER,

@@ -91,6 +91,11 @@ def household() -> Domain:
     return shipped("household")
 
 
+def ai2thor() -> Domain:
+    """The household over AI2-THOR's object types."""
+    return shipped("ai2thor")
+
+
 def bench() -> Domain:
     """The assembly bench that comes with the project."""
     return shipped("bench")

@@ -2,18 +2,21 @@
 
 Run it on a new adapter before anything else (after Gymnasium's environment checker). It speaks to
 the Protocol only, tries the skills of the world's domain, and returns complaints in words; an empty
-list is a pass.
+list is a pass. How exactly a run must repeat is the world's level (`levels`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from threading import Thread
 
 import numpy as np
 
 from forestall.domain.model import Domain
-from forestall.seams import Environment, Unnamed
+from forestall.seams import Environment, Perceiver, Unnamed
+from forestall.testing.levels import NONE, Level, Tolerance, differences
+from forestall.testing.sight import unseen
 from forestall.types.episode import SkillStatus
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
@@ -26,7 +29,13 @@ HOLD_S = 5.0
 
 
 def check_environment(
-    make: Callable[[], Environment], seed: int, subtasks: Sequence[Subtask], domain: Domain
+    make: Callable[[], Environment],
+    seed: int,
+    subtasks: Sequence[Subtask],
+    domain: Domain,
+    level: Level = Level.EXACT,
+    tolerance: Tolerance | None = None,
+    perceiver: Perceiver | None = None,
 ) -> list[str]:
     """Complaints about an environment; empty when it conforms.
 
@@ -35,27 +44,54 @@ def check_environment(
         seed: of the scene to check.
         subtasks: a short plan that the scene allows; its outcomes must repeat.
         domain: what the world is about; each of its skills is tried on names that mean nothing.
+        level: what of it must repeat. On hardware nothing need, the plan runs once and
+            nothing is asked for that makes no sense.
+        tolerance: how far apart two runs may be, at the level TOLERANCE.
+        perceiver: whether it sees what was done is checked, too.
 
     Returns:
-        One sentence for each thing that is wrong: a run that does not repeat to the last bit, time
-        that goes backwards or disagrees with reported durations, observations that are not valid,
-        nonsense that is not refused, an exception where a refusal is due, motion after `hold`, and
-        for one that shares no names (`seams.Unnamed`) a thing taken where a name points at none.
+        One sentence for each thing that is wrong: a run that does not repeat as the level has it,
+        time that goes backwards or disagrees with reported durations, observations that are not
+        valid, nonsense that is not refused, an exception where a refusal is due, motion after
+        `hold`, for one that shares no names (`seams.Unnamed`) a thing taken where a name points at
+        none, and what was done and perception does not see.
     """
+    if level is Level.HARDWARE:
+        return _on_hardware(make(), seed, subtasks, domain, perceiver)
+    within = NONE if level is Level.EXACT else tolerance or Tolerance()
     first, second = make(), make()
     try:
+        runs = (_run(first, seed, subtasks), _run(second, seed, subtasks))
+        again = _run(first, seed, subtasks)
         return [
-            *_repeats(
-                "two fresh environments", _run(first, seed, subtasks), second, seed, subtasks
-            ),
-            *_repeats("two resets", _run(first, seed, subtasks), first, seed, subtasks),
+            *dict.fromkeys(runs[0].complaints),
+            *_repeats(f"two fresh environments with seed {seed}", *runs, within),
+            *_repeats(f"two resets with seed {seed}", runs[0], again, within),
             *_refuses_nonsense(first, seed, domain),
             *_refuses_wrong_places(first, seed, domain),
-            *_holds(first, seed, subtasks),
+            *_holds(first, seed, subtasks, within),
+            *(() if perceiver is None else unseen(first, seed, subtasks, domain, perceiver)),
         ]
     finally:
         first.close()
         second.close()
+
+
+def _on_hardware(
+    robot: Environment,
+    seed: int,
+    subtasks: Sequence[Subtask],
+    domain: Domain,
+    perceiver: Perceiver | None,
+) -> list[str]:
+    try:
+        return [
+            *dict.fromkeys(_run(robot, seed, subtasks).complaints),
+            *(() if perceiver is None else unseen(robot, seed, subtasks, domain, perceiver)),
+            *_holds(robot, seed, subtasks, Tolerance()),
+        ]
+    finally:
+        robot.close()
 
 
 class _Run:
@@ -115,49 +151,22 @@ def _invalid(observation: Observation) -> Iterator[str]:
         yield f"gripper.holding is {holding!r}, not a name"
 
 
-def _repeats(
-    what: str, run: _Run, environment: Environment, seed: int, subtasks: Sequence[Subtask]
-) -> list[str]:
-    again = _run(environment, seed, subtasks)
-    complaints = list(dict.fromkeys(run.complaints))
-    if run.outcomes != again.outcomes:
-        complaints.append(f"{what} with seed {seed} give different outcomes")
+def _repeats(what: str, run: _Run, again: _Run, within: Tolerance) -> Iterator[str]:
+    if not _same_outcomes(run, again, within):
+        yield f"{what} give different outcomes"
     for index, (a, b) in enumerate(zip(run.observations, again.observations, strict=True)):
-        complaints += [
-            f"observation {index}: {name} differs between {what} with seed {seed}"
-            for name in _differences(a, b)
-        ]
-    return complaints
+        for name in differences(a, b, within):
+            yield f"observation {index}: {name} differs between {what}"
 
 
-def _differences(a: Observation, b: Observation) -> Iterator[str]:
-    if len(a.frames) != len(b.frames):
-        yield "the number of frames"
-        return
-    for one, other in zip(a.frames, b.frames, strict=True):
-        for name in ("rgb", "depth_m", "camera_to_world"):
-            if not np.array_equal(getattr(one, name), getattr(other, name)):
-                yield name
-        if not _same_ids(one.instance_ids, other.instance_ids):
-            yield "instance_ids"
-        if one.instance_names != other.instance_names:
-            yield "instance_names"
-    if a.graph != b.graph:
-        yield "the scene graph"
-    if a.told != b.told:
-        yield "what somebody pointed at"
-    if a.gripper != b.gripper:
-        yield "the gripper"
-    if a.robot_position_world_m != b.robot_position_world_m:
-        yield "the robot's position"
-    if a.time_s != b.time_s:
-        yield "time"
-
-
-def _same_ids(a: object, b: object) -> bool:
-    if a is None or b is None:
-        return a is b
-    return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b)
+def _same_outcomes(run: _Run, again: _Run, within: Tolerance) -> bool:
+    """Statuses and durations; the words of a refusal, too, where all must be the same."""
+    if within is NONE:
+        return run.outcomes == again.outcomes
+    return all(
+        a[0] == b[0] and abs(a[1] - b[1]) <= within.time_s
+        for a, b in zip(run.outcomes, again.outcomes, strict=True)
+    )
 
 
 def _refuses_nonsense(environment: Environment, seed: int, domain: Domain) -> Iterator[str]:
@@ -197,7 +206,9 @@ def _refuses_wrong_places(environment: Environment, seed: int, domain: Domain) -
                 yield f"{subtask} is not refused with a reason where its place shows nothing"
 
 
-def _holds(environment: Environment, seed: int, subtasks: Sequence[Subtask]) -> Iterator[str]:
+def _holds(
+    environment: Environment, seed: int, subtasks: Sequence[Subtask], within: Tolerance
+) -> Iterator[str]:
     """Told to hold in the middle of a plan, from another thread, nothing moves before a reset."""
     environment.reset(seed)
     half = len(subtasks) // 2
@@ -209,23 +220,25 @@ def _holds(environment: Environment, seed: int, subtasks: Sequence[Subtask]) -> 
     if after.gripper.holding != before.gripper.holding:
         yield f"hold lets go of {before.gripper.holding}"
     start_s = environment.time_s
+    held = set()
     for subtask in subtasks[half:]:
         for name in subtask.args:
             environment.approach(name)
         outcome = environment.execute(subtask)
+        held.add(outcome.reason)
         if outcome.status is not SkillStatus.REFUSED or not outcome.reason:
             yield f"after hold {subtask} is not refused with a reason"
-    if environment.time_s != start_s:
+    if abs(environment.time_s - start_s) > within.time_s:
         yield f"after hold the robot moves for {environment.time_s - start_s} s"
     rest = environment.scan()
-    if rest.robot_position_world_m != before.robot_position_world_m:
-        yield "after hold the robot drives"
-    if rest.gripper != after.gripper:
-        yield "after hold the hand moves"
+    for name in differences(replace(before, frames=rest.frames), rest, within):
+        if name == "the robot's position":
+            yield "after hold the robot drives"
+    for name in differences(replace(after, frames=rest.frames), rest, within):
+        if name == "the gripper":
+            yield "after hold the hand moves"
     environment.reset(seed)
-    fresh = [environment.execute(s).status for s in subtasks[:1]]
-    environment.reset(seed)
-    if fresh != [environment.execute(s).status for s in subtasks[:1]]:
+    if any(environment.execute(s).reason in held - {""} for s in subtasks[:1]):
         yield "after hold it takes more than one reset until the robot acts again"
 
 
