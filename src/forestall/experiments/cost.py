@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from forestall.experiments.runs import Run
 from forestall.statistics.rows import NOBODY, PERFECT
 
-FIRST_S = 0.65
+FIRST_S = 1.0
 """Seconds of one core for a step of the watched run: nearly all is drawn for the first time."""
 
 SENSED_S = 0.6
