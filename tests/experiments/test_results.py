@@ -12,7 +12,7 @@ from experiments.episodes import computed_row
 from forestall.cli.main import call
 from forestall.errors import FileFormatError
 from forestall.experiments.conduct import Experiment, conduct
-from forestall.experiments.folder import ROWS
+from forestall.experiments.folder import ABOUT, ROWS
 from forestall.experiments.results import SUMMARY, present
 from forestall.experiments.runs import Choice
 from forestall.statistics import intervals
@@ -63,6 +63,17 @@ def test_what_was_asked_for_and_is_not_there_is_said(tmp_path: Path) -> None:
     data, tables = present(tmp_path)
     assert "missing: 4 episodes of online on irreversible, kind" in data["episodes"]["notes"]
     assert all("missing: 4 episodes of online on irreversible" in t.note for t in tables)
+
+
+def test_what_other_code_would_have_run_is_not_said_to_be_missing(tmp_path: Path) -> None:
+    made(tmp_path, 1)
+    about = json.loads((tmp_path / ABOUT).read_text())
+    (tmp_path / ABOUT).write_text(json.dumps(about | {"sources": "0123456789abcdef"}))
+    lines = (tmp_path / ROWS).read_text().splitlines(keepends=True)
+    (tmp_path / ROWS).write_text("".join(x for x in lines if '"strategy": "online"' not in x))
+    notes = present(tmp_path)[0]["episodes"]["notes"]
+    assert "asked for: 4 of 100 cases of robofail, kind" in notes
+    assert not any(n.startswith("missing") for n in notes)
 
 
 def test_the_command_makes_the_page_again_and_names_what_is_no_experiment(

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError, InputError
-from forestall.experiments.folder import ResultsFolder, episodes_in
+from forestall.experiments.folder import EXPERIMENT, About, ResultsFolder, episodes_in
 from forestall.experiments.runs import runs_for
 from forestall.experiments.worker import PAGES
 from forestall.files import make_folder, replace_file
-from forestall.kinds import CAPTIONER, IMAGE_ENCODER
+from forestall.kinds import CAPTIONER, IMAGE_ENCODER, STORE
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import Case, cases
 from forestall.statistics.findings import findings
@@ -92,7 +93,7 @@ def summary_of(
         "effort": folder.effort(),
     }
     try:
-        notes = _missing(folder, about, {row.key for row in rows})
+        notes = _missing(folder, about, rows)
     except FileFormatError:
         raise
     except InputError as error:  # names that this version does not know
@@ -117,24 +118,45 @@ def calibration_of(path: Path, about: dict[str, Any]) -> list[EpisodeRow]:
 
 
 def _missing(
-    folder: ResultsFolder[EpisodeRow], about: dict[str, Any], found: set[str]
+    folder: ResultsFolder[EpisodeRow], about: dict[str, Any], rows: Sequence[EpisodeRow]
 ) -> list[str]:
-    """What was asked for and is not there, and what was not asked for."""
-    wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
-    lacking = Counter(
-        f"{run.strategy} on {run.case.set}, {run.profile}"
-        for key, run in wanted.items()
-        if key not in found
-    )
-    notes = [f"missing: {count} episodes of {what}" for what, count in lacking.items()]
+    """What was asked for and is not there, and what was not asked for.
+
+    Which episodes a call asks for is the code's affair: of results of other code only what is there
+    is known, and nothing is said to be missing.
+    """
     used: dict[tuple[str, str], set[Case]] = {}
-    for run in wanted.values():
-        used.setdefault((run.profile, run.case.set), set()).add(run.case)
-    for (profile, of), there in used.items():
+    notes: list[str] = []
+    if not _of_this_code(about):
+        for row in rows:
+            used.setdefault((row.profile, row.set), set()).add(
+                Case(row.set, row.task, row.scenario, row.seed)
+            )
+    else:
+        wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
+        lacking = Counter(
+            f"{run.strategy} on {run.case.set}, {run.profile}"
+            for run in (wanted[key] for key in wanted.keys() - {row.key for row in rows})
+        )
+        notes = [f"missing: {n} episodes of {what}" for what, n in sorted(lacking.items())]
+        for run in wanted.values():
+            used.setdefault((run.profile, run.case.set), set()).add(run.case)
+    for (profile, of), there in sorted(used.items()):
         whole = len(cases(of, about["split"], about["rounds"], further=profile == HONEST))
         if len(there) < whole:
             notes.append(f"asked for: {len(there)} of {whole} cases of {of}, {profile}")
     return notes
+
+
+def _of_this_code(about: dict[str, Any]) -> bool:
+    """Whether the code at hand would make these results, with the memory that was given."""
+    store = about["settings"]["parts"].get(STORE.name, {})
+    memory = {**store.get("defaulted", {}), **store.get("given", {})}.get("path")
+    try:
+        now = About.now(EXPERIMENT, {"settings": about["settings"]}, memory)
+    except OSError:  # the memory is no longer there
+        return False
+    return now.sources == str(about["sources"])
 
 
 def shown_names(settings: dict[str, Any]) -> dict[str, str]:

@@ -59,7 +59,7 @@ DEMONSTRATIONS = 8
 """Of each task in the honest household."""
 
 PART = 0.05
-"""Of the cases of each set in "all", so that it ends within an hour on two cores. The
+"""Of the cases of each set in "all": little more than an hour on two cores. The
 undisturbed runs of the honest household are all among them: they are every other case's twin."""
 
 STEPPING_IN = 1 / 6
