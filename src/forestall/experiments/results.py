@@ -125,6 +125,7 @@ def _missing(
     Which episodes a call asks for is the code's affair: of results of other code only what is there
     is known, and nothing is said to be missing.
     """
+    wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
     used: dict[tuple[str, str], set[Case]] = {}
     notes: list[str] = []
     if not _of_this_code(about):
@@ -133,7 +134,6 @@ def _missing(
                 Case(row.set, row.task, row.scenario, row.seed)
             )
     else:
-        wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
         lacking = Counter(
             f"{run.strategy} on {run.case.set}, {run.profile}"
             for run in (wanted[key] for key in wanted.keys() - {row.key for row in rows})
