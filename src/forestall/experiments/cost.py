@@ -14,7 +14,8 @@ from forestall.experiments.runs import Run
 from forestall.statistics.rows import NOBODY, PERFECT
 
 FIRST_S = 1.0
-"""Seconds of one core for a step of the watched run: nearly all is drawn for the first time."""
+"""Seconds of one core for a step of the watched run: nearly all is drawn for the first time. Of ten
+runs, every judge with the second looks that it asks for."""
 
 SENSED_S = 0.6
 """For a step of a run through another sensor, whose pictures were drawn for the one without."""
