@@ -10,7 +10,6 @@ import time
 from dataclasses import dataclass, field, replace
 
 from forestall.domain.formula import TRUE as ALWAYS
-from forestall.domain.formula import literals
 from forestall.domain.looked import looked_into, not_there
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import truth
@@ -89,18 +88,14 @@ class Intervention:
 
     def check_rest(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer:
         """Inside a repair: does what is left of the plan still run from what is seen?"""
-        check = self.check_plan(context, clock)
+        diagnosis = self.why_not(context, clock)
         verdict = checked(
             PLAN_CHECK,
-            check.ok,
+            diagnosis is None,
             "a step of the repair: the rest of the plan is checked instead of compared",
         )
-        if check.ok:
-            unseen = relied_on_now(check, context, self._validator.domain)
-            if unseen:
-                return look_again(verdict, clock, f"not observed: {', '.join(map(str, unseen))}")
+        if diagnosis is None:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
-        diagnosis = would_not_work(check)
         if context.may_look:
             return look_again(verdict, clock, diagnosis.cause, diagnosis)
         return self.alarm(context, verdict, diagnosis, clock)
@@ -311,38 +306,6 @@ def look_again(
     return StrategyAnswer(
         Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items(), suspected=suspected
     )
-
-
-def relied_on_now(
-    check: PlanCheck, context: BoundaryContext, domain: Domain
-) -> tuple[Literal, ...]:
-    """Unobserved facts about the next subtask's arguments that its needs speak of.
-
-    What is assumed of things that nobody has seen is not among them: those are looked for.
-    """
-    needed, known = _spoken_of(domain, context.subtask.skill), {n.id for n in context.graph.nodes}
-    return tuple(
-        x
-        for x in check.assumed
-        if x.predicate in needed
-        and set(x.args) & set(context.subtask.args)
-        and known.issuperset(x.args)
-    )
-
-
-def _spoken_of(domain: Domain, skill: str) -> set[str]:
-    """Predicates of a skill's needs, and of what derived ones among them are defined by."""
-    pending = [x.predicate for n in domain.skill(skill).needs for x, _ in literals(n.formula)]
-    found: set[str] = set()
-    while pending:
-        predicate = pending.pop()
-        if predicate in found:
-            continue
-        found.add(predicate)
-        known = domain.derived.get(predicate)
-        if known is not None and known.definition is not None:
-            pending += [x.predicate for x, _ in literals(known.definition)]
-    return found
 
 
 def rest_of(context: BoundaryContext, domain: Domain) -> Plan:
