@@ -29,8 +29,10 @@ from forestall.comparison.options import (
 from forestall.comparison.prepare import (
     LabelTable,
     Prepared,
+    Words,
     prepare,
     tie_values,
+    widened,
 )
 from forestall.domain.model import Domain
 from forestall.seams import TextEncoder
@@ -48,7 +50,7 @@ class _Stack:
     labels: Ints  # (R, M), -1 where there is no node
     roles: Ints  # (R, M)
     numbers: Ints  # (R, M)
-    around: npt.NDArray[np.uint64]  # (R, M)
+    around: Words  # (R, M, words)
     degree: Ints  # (R, M)
     largest: Ints  # (R)
     looks: Looks  # of the R * M places
@@ -210,12 +212,13 @@ def _stacked(graphs: Sequence[Prepared], predicates: int) -> _Stack:
     size = int(nodes.max(initial=1)) or 1
     labels = np.full((len(graphs), size), -1, dtype=np.int64)
     roles, numbers, degree = (np.zeros((len(graphs), size), dtype=np.int64) for _ in range(3))
-    around = np.zeros((len(graphs), size), dtype=np.uint64)
+    words = max((g.around.shape[1] for g in graphs), default=1)
+    around = np.zeros((len(graphs), size, words), dtype=np.uint64)
     linked = np.zeros((len(graphs), predicates, size, size), dtype=np.bool_)
     for r, g in enumerate(graphs):
         n = len(g.names)
         labels[r, :n], roles[r, :n], numbers[r, :n] = g.labels, g.roles, g.numbers
-        around[r, :n], degree[r, :n] = g.around, g.degree
+        around[r, :n], degree[r, :n] = widened(g.around, words), g.degree
         linked[r, g.edges[:, 1], g.edges[:, 0], g.edges[:, 2]] = True
     return _Stack(
         graphs=tuple(graphs),

@@ -8,6 +8,7 @@ are rounded to multiples of 2^-24, which makes every sum of them exact in float6
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import zlib
 from collections.abc import Sequence
@@ -25,6 +26,8 @@ from forestall.types.graph import ObjectNode, SceneGraph
 
 SUPPORT = "support"
 _NUMBER = re.compile(r"-\d+\b")
+
+Words = npt.NDArray[np.uint64]
 
 Label = tuple[str, tuple[tuple[str, str], ...], str]
 """Category, known states that count, and the key of an instance category ("" otherwise)."""
@@ -50,7 +53,8 @@ class Prepared:
         labels: (n) row in the label table.
         roles: (n) which argument of the subtask the node is, 0 for none.
         numbers: (n) hash of the id, for ties.
-        around: (n) uint64 bit set of the node's surroundings, for ties.
+        around: (n, words) uint64 bit set of the node's surroundings, for ties; a bit for each that
+            the table has numbered.
         edges: (e, 3) subject, predicate, object as indices.
         degree: (n) compared edges at each node.
         looks: image features of the nodes that have one; nothing unless they are compared.
@@ -63,7 +67,7 @@ class Prepared:
     labels: Ints
     roles: Ints
     numbers: Ints
-    around: npt.NDArray[np.uint64]
+    around: Words
     edges: Ints
     degree: Ints
     looks: Looks
@@ -81,6 +85,7 @@ class LabelTable:
         self._encoder = encoder
         self._labels: list[Label | str] = []
         self._index: dict[Label | str, int] = {}
+        self._surroundings: dict[tuple[bool, int, str], int] = {}
         self._table: Floats = np.zeros((0, 0))
         self._vectors: dict[str, Floats] = {}
         self._cosines: dict[tuple[str, str], float] = {}
@@ -95,6 +100,18 @@ class LabelTable:
             found = self._index[label] = len(self._labels)
             self._labels.append(label)
         return found
+
+    def surrounding(self, subject: bool, predicate: int, category: str) -> int:
+        """The number of what a node may have around it: being the subject (or object) of an edge.
+
+        Args:
+            subject: whether the node is the subject.
+            predicate: of the edge.
+            category: of the node at the other end.
+        """
+        return self._surroundings.setdefault(
+            (subject, predicate, category), len(self._surroundings)
+        )
 
     def similarities(self) -> Floats:
         """(labels, labels) cosine of text features, 0 below the floor.
@@ -189,8 +206,8 @@ def prepare(graph: SceneGraph, config: CountedConfig, table: LabelTable) -> Prep
     for s, p, o in edges:
         degree[s] += 1
         degree[o] += 1
-        around[s] |= _bit(f">{p}{labels[o][0]}")
-        around[o] |= _bit(f"<{p}{labels[s][0]}")
+        around[s] |= 1 << table.surrounding(True, p, labels[o][0])
+        around[o] |= 1 << table.surrounding(False, p, labels[s][0])
     rows = [table.row(label) for label in labels]
     features = _features([groups[k][0] for k in keys], config)
     seen = hashlib.blake2b(repr(features).encode()).hexdigest() if any(features) else ""
@@ -204,7 +221,7 @@ def prepare(graph: SceneGraph, config: CountedConfig, table: LabelTable) -> Prep
         labels=np.array(rows, dtype=np.int64),
         roles=np.array(role_codes, dtype=np.int64),
         numbers=np.array(numbers, dtype=np.int64),
-        around=np.array(around, dtype=np.uint64),
+        around=_words(around),
         edges=np.array(edges, dtype=np.int64).reshape(-1, 3),
         degree=np.array(degree, dtype=np.int64),
         looks=looks_of(features),
@@ -243,8 +260,17 @@ def _label(node: ObjectNode, config: CountedConfig, roles: dict[str, int]) -> La
     return (category, states, key)
 
 
-def _bit(feature: str) -> int:
-    return 1 << (zlib.crc32(feature.encode()) % 61)
+def _words(sets: Sequence[int]) -> Words:
+    """(n, words) of sets of bits, as many words as the largest needs."""
+    size = max(1, math.ceil(max((x.bit_length() for x in sets), default=0) / 64))
+    whole = b"".join(x.to_bytes(8 * size, "little") for x in sets)
+    return np.frombuffer(whole, dtype="<u8").reshape(-1, size).astype(np.uint64)
+
+
+def widened(words: Words, size: int) -> Words:
+    """The same sets in (..., size) words, or in as many as they have."""
+    lacking = max(0, size - words.shape[-1])
+    return np.pad(words, [(0, 0)] * (words.ndim - 1) + [(0, lacking)]) if lacking else words
 
 
 def ties(observed: Prepared, expected: Prepared) -> Floats:
@@ -255,14 +281,20 @@ def ties(observed: Prepared, expected: Prepared) -> Floats:
 
 
 def tie_values(
-    role: npt.NDArray[np.bool_],
-    ours: npt.NDArray[np.uint64],
-    theirs: npt.NDArray[np.uint64],
-    same: npt.NDArray[np.bool_],
+    role: npt.NDArray[np.bool_], ours: Words, theirs: Words, same: npt.NDArray[np.bool_]
 ) -> Floats:
-    """Whole numbers below 1024: the same argument first, then alike surroundings, then the id."""
-    both = np.bitwise_count(ours & theirs).astype(np.int64)
-    either = np.bitwise_count(ours | theirs).astype(np.int64)
+    """Whole numbers below 1024: the same argument first, then alike surroundings, then the id.
+
+    Args:
+        role: (...) whether both are the same argument of the subtask.
+        ours: (..., words) surroundings of the one.
+        theirs: (..., words) of the other; their numbers of words may differ.
+        same: (...) whether both have the same id.
+    """
+    size = max(ours.shape[-1], theirs.shape[-1])
+    ours, theirs = widened(ours, size), widened(theirs, size)
+    both = np.bitwise_count(ours & theirs).sum(axis=-1, dtype=np.int64)
+    either = np.bitwise_count(ours | theirs).sum(axis=-1, dtype=np.int64)
     alike = (255 * (both + 1)) // (either + 1)
     values: Floats = (512 * role + 2 * alike + same).astype(np.float64)
     return values
