@@ -6,8 +6,16 @@ import pytest
 from scripted import OPEN, REPAIRED, Parts, boundary
 
 from forestall.strategies.proactive import Proactive
+from forestall.types.facts import Literal
+from forestall.types.graph import ObjectNode, SceneGraph
+from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext
-from forestall.types.verdict import Decision, Replan, ReplanOutcome
+from forestall.types.task import Goal
+from forestall.types.verdict import Decision, PlanCheck, Replan, ReplanOutcome
+
+RESTING = Literal.parse("toggled(Microwave-1)=off")
+SHUT = Literal.parse("open(Microwave-1)=closed")
+DIRTY = Literal.parse("dirty(Microwave-1)=dirty")
 
 
 def strategy(parts: Parts) -> Proactive:
@@ -61,6 +69,41 @@ def test_steps_of_a_repair_are_checked_instead_of_compared(
         again = proactive.before_subtask(replace(repairing, looks=2, may_look=False))
         assert again.diagnosis is not None
         assert "the microwave is closed" in again.diagnosis.cause
+
+
+class Assuming(Parts):
+    """A validator whose plans run only as long as something holds that nobody saw."""
+
+    assumed: tuple[Literal, ...] = ()
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        return replace(super().check(plan, graph, goal), assumed=self.assumed)
+
+
+@pytest.mark.parametrize("may_look", [True, False])
+@pytest.mark.parametrize(
+    ("assumed", "decision"),
+    [
+        ((), Decision.PROCEED),
+        ((RESTING,), Decision.LOOK_AGAIN),
+        ((SHUT, DIRTY), Decision.PROCEED),  # opening has nothing to do with them
+    ],
+)
+def test_a_step_of_a_repair_does_not_start_on_what_nobody_saw(
+    context: BoundaryContext, assumed: tuple[Literal, ...], decision: Decision, may_look: bool
+) -> None:
+    parts = Assuming(Decision.REPLAN, (OPEN,))
+    proactive = strategy(parts)
+    proactive.before_subtask(context)
+    parts.assumed = assumed
+    opening = REPAIRED.subtasks[0]
+    graph = SceneGraph((ObjectNode("Microwave-1", "Microwave"),))
+    repairing = replace(
+        context, plan=REPAIRED, subtask=opening, index=0, replans=1, graph=graph, may_look=may_look
+    )
+    answer = proactive.before_subtask(repairing)
+    assert answer.decision is decision
+    assert ("not observed" in answer.why) == (decision is Decision.LOOK_AGAIN)
 
 
 def test_after_the_repair_demonstrations_count_again(context: BoundaryContext) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 
+from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.formula import TRUE as ALWAYS
 from forestall.domain.looked import looked_into, not_there
 from forestall.domain.model import LOCATED, Domain
@@ -88,14 +89,18 @@ class Intervention:
 
     def check_rest(self, context: BoundaryContext, clock: Clock) -> StrategyAnswer:
         """Inside a repair: does what is left of the plan still run from what is seen?"""
-        diagnosis = self.why_not(context, clock)
+        check = self.check_plan(context, clock)
         verdict = checked(
             PLAN_CHECK,
-            diagnosis is None,
+            check.ok,
             "a step of the repair: the rest of the plan is checked instead of compared",
         )
-        if diagnosis is None:
+        if check.ok:
+            unseen = relied_on_now(check, context, self._validator.domain)
+            if unseen:
+                return look_again(verdict, clock, f"not observed: {', '.join(map(str, unseen))}")
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        diagnosis = would_not_work(check)
         if context.may_look:
             return look_again(verdict, clock, diagnosis.cause, diagnosis)
         return self.alarm(context, verdict, diagnosis, clock)
@@ -305,6 +310,24 @@ def look_again(
     verdict = replace(verdict, decision=Decision.LOOK_AGAIN)
     return StrategyAnswer(
         Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items(), suspected=suspected
+    )
+
+
+def relied_on_now(
+    check: PlanCheck, context: BoundaryContext, domain: Domain
+) -> tuple[Literal, ...]:
+    """Unobserved facts about the next subtask's arguments that its needs ask about.
+
+    What is assumed of things that nobody has seen is not among them: those are looked for.
+    """
+    graph = context.graph
+    asked, known = asked_of(graph, context.subtask, domain), {n.id for n in graph.nodes}
+    return tuple(
+        x
+        for x in check.assumed
+        if set(x.args) & set(context.subtask.args)
+        and known.issuperset(x.args)
+        and is_asked(x, asked)
     )
 
 

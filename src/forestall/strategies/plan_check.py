@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from forestall.domain.formula import literals
-from forestall.domain.model import Domain
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.intervention import (
     PLAN_CHECK,
@@ -18,10 +16,10 @@ from forestall.strategies.intervention import (
     Intervention,
     checked,
     look_again,
+    relied_on_now,
     would_not_work,
 )
 from forestall.types.episode import SkillOutcome
-from forestall.types.facts import Literal
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.verdict import Decision, PlanCheck
 
@@ -80,38 +78,6 @@ class PlanChecking:
     def after_episode(self, context: BoundaryContext) -> StrategyAnswer:
         """Go on: the last check was before the last subtask."""
         return _GO_ON
-
-
-def relied_on_now(
-    check: PlanCheck, context: BoundaryContext, domain: Domain
-) -> tuple[Literal, ...]:
-    """Unobserved facts about the next subtask's arguments that its needs speak of.
-
-    What is assumed of things that nobody has seen is not among them: those are looked for.
-    """
-    needed, known = _spoken_of(domain, context.subtask.skill), {n.id for n in context.graph.nodes}
-    return tuple(
-        x
-        for x in check.assumed
-        if x.predicate in needed
-        and set(x.args) & set(context.subtask.args)
-        and known.issuperset(x.args)
-    )
-
-
-def _spoken_of(domain: Domain, skill: str) -> set[str]:
-    """Predicates of a skill's needs, and of what derived ones among them are defined by."""
-    pending = [x.predicate for n in domain.skill(skill).needs for x, _ in literals(n.formula)]
-    found: set[str] = set()
-    while pending:
-        predicate = pending.pop()
-        if predicate in found:
-            continue
-        found.add(predicate)
-        known = domain.derived.get(predicate)
-        if known is not None and known.definition is not None:
-            pending += [x.predicate for x, _ in literals(known.definition)]
-    return found
 
 
 def told(check: PlanCheck) -> str:
