@@ -154,7 +154,7 @@ class RunState:
         subtask = self.ground()
         node = self.graph.get(subtask.args[-1])
         if (
-            self.domain.skill(subtask.skill).drives
+            self.domain.drives(subtask)
             or node is None
             or node.centroid_m is None
             or self.domain.is_open_support(node.category)

@@ -11,6 +11,7 @@ from forestall.detection.preconditions import PreconditionDetector
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.domain.load import shipped
 from forestall.planning.ahead import Foresight, foresee
+from forestall.strategies.intervention import rest_of
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
@@ -99,6 +100,13 @@ def test_what_a_step_puts_right_before_it_matters_is_none() -> None:
 def test_before_the_step_itself_it_is_an_alarm_wherever_it_is_cleaned_later() -> None:
     late = Plan.parse(["insert(Bolt-1, BoltHole-1)", *CLEANS.texts()[:2]])
     assert judge(late, scene(hole="dirty", held=True)).decision is Decision.REPLAN
+
+
+def test_after_a_step_whose_skill_nobody_knows_the_next_is_judged() -> None:
+    plan = Plan.parse(["hum(Bolt-1)", "insert(Bolt-1, BoltHole-1)"])
+    assert judge(plan, scene(held=True), index=1).decision is Decision.PROCEED
+    assert judge(plan, scene(hole="dirty", held=True), index=1).decision is Decision.REPLAN
+    assert rest_of(context(plan, scene(held=True), 1), BENCH).texts() == plan.texts()[1:]
 
 
 def test_the_reasoner_names_what_a_later_step_lacks() -> None:

@@ -253,7 +253,7 @@ class _Bench:
         subtasks = tuple(s.subtask for s in run.steps)
         skill = subtasks[position].skill
         start = position
-        if start > 0 and self._domain.skill(subtasks[start - 1].skill).drives:
+        if start > 0 and self._domain.drives(subtasks[start - 1]):
             start -= 1
         goal = self._goal(run.task)
         check = GraphValidator(self._domain).check(

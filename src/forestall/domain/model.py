@@ -393,6 +393,11 @@ class Domain:
         verb = skill.words if skill is not None and skill.words else step.skill.replace("_", " ")
         return " ".join((verb, *step.args))
 
+    def drives(self, step: Subtask) -> bool:
+        """Whether a step only drives; of a skill that is not known nobody knows that."""
+        skill = self.skills.get(step.skill)
+        return skill is not None and skill.drives
+
     def driving(self) -> Skill | None:
         """The skill that only drives, if the robot has one."""
         return next((s for s in self.skills.values() if s.drives), None)

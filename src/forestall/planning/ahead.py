@@ -28,7 +28,7 @@ class Foresight:
 
     def __init__(self, graph: SceneGraph, plan: Plan, index: int, domain: Domain) -> None:
         self._domain = domain
-        before = index > 0 and domain.skill(plan.subtasks[index - 1].skill).drives
+        before = index > 0 and domain.drives(plan.subtasks[index - 1])
         left = plan.subtasks[index - before :]
         trace = run(observed(graph, domain), left)
         self._states = trace.states[before:]

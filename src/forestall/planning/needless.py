@@ -39,11 +39,11 @@ def without(state: State, steps: Sequence[Subtask], pair: tuple[int, int]) -> tu
         if k in pair:
             gap = True
             continue
-        if gap and left and _drives(state, step) and _drives(state, steps[left[-1]]):
+        if gap and left and state.domain.drives(step) and state.domain.drives(steps[left[-1]]):
             left.pop()
         left.append(k)
         gap = False
-    if gap and left and _drives(state, steps[left[-1]]):
+    if gap and left and state.domain.drives(steps[left[-1]]):
         left.pop()
     return tuple(left)
 
@@ -105,7 +105,7 @@ def _candidates(whole: Trace) -> list[tuple[int, int]]:
     contents = [content(s) for s in whole.states]
     added = [b - a for a, b in pairwise(contents)]
     ended = [a - b for a, b in pairwise(contents)]
-    acting = [k for k, s in enumerate(whole.meant) if not _drives(whole.states[0], s)]
+    acting = [k for k, s in enumerate(whole.meant) if not whole.states[0].domain.drives(s)]
     idle = [(k, k) for k in acting if not added[k] and not ended[k]]
     pairs = [
         (i, j)
@@ -123,8 +123,3 @@ def _needless(whole: Trace, steps: Sequence[Subtask], pair: tuple[int, int]) -> 
         return False
     after = zip(kept, trace.states[1:], strict=True)
     return all(unsafe(shorter) <= unsafe(whole.states[k + 1]) for k, shorter in after)
-
-
-def _drives(state: State, step: Subtask) -> bool:
-    skill = state.domain.skills.get(step.skill)
-    return skill is not None and skill.drives

@@ -97,7 +97,7 @@ def _units(trace: Trace, steps: Sequence[Subtask], own: int) -> list[_Unit]:
     drive: tuple[Subtask, Subtask] | None = None
     for k, (step, meant) in enumerate(zip(steps, trace.meant, strict=True)):
         last = k == len(steps) - 1
-        if domain.skill(step.skill).drives and not last:
+        if domain.drives(step) and not last:
             drive = (step, meant)
             continue
         state = trace.states[k]

@@ -22,7 +22,7 @@ def ahead(context: BoundaryContext, domain: Domain) -> list[Subtask]:
     left = context.remaining()
     if context.when is When.BEFORE and left:
         left = (context.subtask, *left[1:])
-    return [s for s in left if s.skill not in domain.skills or not domain.skills[s.skill].drives]
+    return [s for s in left if not domain.drives(s)]
 
 
 def needing(

@@ -160,7 +160,7 @@ def _same(name: str, held: str | None) -> bool:
 
 
 def _without_drives(steps: Sequence[Subtask], domain: Domain) -> list[Subtask]:
-    return [s for s in steps if s.skill not in domain.skills or not domain.skills[s.skill].drives]
+    return [s for s in steps if not domain.drives(s)]
 
 
 def _kind(step: Subtask) -> tuple[str, ...]:

@@ -121,7 +121,7 @@ def _ended_first(asked: Asked, steps: Steps, mine: int) -> list[tuple[Steps, int
 
 
 def _drives(state: State, step: Subtask) -> bool:
-    return state.domain.skill(step.skill).drives
+    return state.domain.drives(step)
 
 
 def _restored(asked: Asked, steps: Sequence[Subtask], count: int) -> set[Literal]:

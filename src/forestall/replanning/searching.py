@@ -87,7 +87,7 @@ def _taken(step: Subtask, domain: Domain) -> tuple[str, ...]:
 
 
 def _acting(steps: Sequence[Subtask], domain: Domain) -> tuple[Subtask, ...]:
-    return tuple(s for s in steps if not domain.skill(s.skill).drives)
+    return tuple(s for s in steps if not domain.drives(s))
 
 
 def _same(step: Subtask, other: Subtask) -> bool:

@@ -334,7 +334,7 @@ def relied_on_now(
 def rest_of(context: BoundaryContext, domain: Domain) -> Plan:
     """What is left of the plan, with the drive before it: where the robot stands matters."""
     start = context.index
-    if start > 0 and domain.skill(context.plan.subtasks[start - 1].skill).drives:
+    if start > 0 and domain.drives(context.plan.subtasks[start - 1]):
         start -= 1
     return Plan(context.plan.subtasks[start:], context.plan.goal)
 

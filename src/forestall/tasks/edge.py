@@ -124,8 +124,7 @@ class WorldsEdge:
         try:
             args = tuple(self._meant(a, where, true) for a in subtask.args)
         except NotThereError as error:
-            skill = self._domain.skills.get(subtask.skill)
-            drives = skill is not None and skill.drives
+            drives = self._domain.drives(subtask)
             seconds = self._drive_near(subtask.args[-1], where) if drives else 0.0
             self.newest = self._truly(subtask, where, true)
             return SkillOutcome(SkillStatus.REFUSED, seconds, str(error))

@@ -214,7 +214,7 @@ class ErringPlanner:
         return len(self.domain.kinds(one) & self.domain.kinds(other))
 
     def _drives(self, step: Subtask) -> bool:
-        return self.domain.skill(step.skill).drives
+        return self.domain.drives(step)
 
     def _one(self, options: list[int]) -> int:
         return options[int(self.rng.integers(len(options)))]

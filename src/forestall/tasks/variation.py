@@ -182,7 +182,7 @@ class _Varying:
         parts: list[Steps] = []
         begun = 0
         for k in range(len(trace.states) - 1):
-            drives = self.domain.skill(self.steps[k].skill).drives
+            drives = self.domain.drives(self.steps[k])
             if trace.states[k + 1].held is None and not drives:
                 parts.append(self.steps[begun : k + 1])
                 begun = k + 1
@@ -193,7 +193,7 @@ class _Varying:
         parts: list[Steps] = []
         drives: Steps = ()
         for step in steps:
-            if self.domain.skill(step.skill).drives:
+            if self.domain.drives(step):
                 drives = (*drives, step)
             else:
                 parts.append((*drives, step))
@@ -259,7 +259,7 @@ class _Varying:
                 if ended is None or node.state(ended.predicate) == ended.value:
                     steps = (*way, Subtask(there.name, (node.id,)), Subtask(back.name, (node.id,)))
                     options.append((steps, f"{steps[-2]} and back"))
-        before = [k for k, s in enumerate(self.steps) if domain.skill(s.skill).drives] or [0]
+        before = [k for k, s in enumerate(self.steps) if domain.drives(s)] or [0]
         for k in self.rng.permutation(len(options)):
             steps, words = options[int(k)]
             at = before[int(self.rng.integers(len(before)))]
