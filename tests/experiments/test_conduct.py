@@ -17,6 +17,7 @@ from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, EFFORT, ROWS, ResultsFolder, episodes_in
 from forestall.experiments.runs import PART, Choice, Run, Settings, by_scene, runs_for
+from forestall.experiments.worker import Work
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
 
@@ -185,6 +186,17 @@ def test_two_commands_do_not_write_to_one_folder(tmp_path: Path) -> None:
         pytest.raises(InputError, match="written by process"),
     ):
         play(SMALL, tmp_path)
+
+
+def test_telling_pages_are_those_of_the_shipped_monitor_in_every_household(tmp_path: Path) -> None:
+    runs = Choice("all", "development", limit=2).runs()
+    settings = Settings(pages="telling")
+    telling = [r for r in runs if Work(r, settings, str(tmp_path)).page_folder]
+    assert {r.profile for r in telling} == {"honest", "kind"}
+    assert {(r.strategy, r.model, r.without) for r in telling} == {("proactive", "exact", None)}
+    assert len({(r.profile, r.case) for r in telling}) == len(telling)
+    acted = {(r.profile, r.case) for r in runs if r.strategy == "proactive"}
+    assert {(r.profile, r.case) for r in telling} == acted
 
 
 def test_a_call_that_was_killed_while_it_noted_itself_is_no_call(tmp_path: Path) -> None:

@@ -86,7 +86,8 @@ class Work:
     def page_folder(self) -> Path | None:
         """Where the run's own page goes, None where it gets none."""
         run, pages = self.run, self.settings.pages
-        telling = run == Run(run.case, "proactive")
+        shipped = Run(run.case, "proactive", profile=run.profile, demonstrations=run.demonstrations)
+        telling = run == shipped
         if self.folder is None or pages == "none" or (pages == "telling" and not telling):
             return None
         return Path(self.folder) / PAGES / run.key
