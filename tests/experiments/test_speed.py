@@ -40,6 +40,9 @@ def test_a_measurement_goes_on_where_it_was(tmp_path: Path) -> None:
     whole = measure(3, 0, tmp_path, lambda done, total, what: told.append((done, total)))
     assert [r["what"] for r in whole["rows"]] == list(GROUPS)
     assert whole["machine"]["cores"]
+    table = (tmp_path / "speed.csv").read_text().splitlines()
+    assert table[0] == "what,median,least,most,unit,aim,median / aim"
+    assert [line.partition(",")[0] for line in table[1:]] == list(GROUPS)
     assert told == [(k, len(GROUPS)) for k in range(len(GROUPS) + 1)]
     lines = (tmp_path / ROWS).read_text().splitlines(keepends=True)
     (tmp_path / ROWS).write_text(lines[0] + lines[1][:9])

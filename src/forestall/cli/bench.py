@@ -40,7 +40,7 @@ def speed(
     """
     from forestall.cli.progress import bar
     from forestall.errors import InputError
-    from forestall.experiments.speed import REPEAT, measure
+    from forestall.experiments.speed import REPEAT, measure, table
 
     repeat = REPEAT if repeat is None else repeat
     if repeat < 1:
@@ -53,23 +53,9 @@ def speed(
         return 0
     from forestall.cli.listing import print_table
 
-    print_table(
-        ("what", "median", "least", "most", "unit", "aim", "median / aim"),
-        [
-            (
-                r["what"],
-                f"{r['median']:.2f}",
-                f"{r['least']:.2f}",
-                f"{r['most']:.2f}",
-                r["unit"],
-                "" if r["aim"] is None else f"{r['aim']:g}",
-                "" if r["aim"] is None else f"{r['median'] / r['aim']:.2f}",
-            )
-            for r in report["rows"]
-        ],
-    )
-    machine = report["machine"]
-    print(f"{machine['processor']}, {machine['cores']} cores, {machine['platform']}")
+    made = table(report)
+    print_table(made.header, list(made.rows))
+    print(made.note)
     return 0
 
 

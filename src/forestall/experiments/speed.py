@@ -29,10 +29,12 @@ from forestall.experiments.boundary_speed import boundary_times
 from forestall.experiments.conduct import Progress
 from forestall.experiments.engines import WorkerDiedError, computed, make_lanes
 from forestall.experiments.folder import About, ResultsFolder
+from forestall.files import replace_file
 from forestall.kinds import PERCEIVER, REPLANNER, SEGMENTER
 from forestall.planning.planner import plan_goal
 from forestall.reading.fields import Field
 from forestall.seams import OpenWorld, Replanner
+from forestall.statistics.cells import Table
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.episode import EpisodeRecord
 from forestall.types.plan import Subtask
@@ -114,7 +116,7 @@ def measure(repeat: int, seed: int, out: Path, progress: Progress) -> dict[str, 
     Args:
         repeat: how often each part is timed.
         seed: of the scene.
-        out: folder of the results.
+        out: folder of the results; the table lies in it as `speed.csv`.
         progress: told (done, total, what).
 
     Raises:
@@ -134,7 +136,32 @@ def measure(repeat: int, seed: int, out: Path, progress: Progress) -> dict[str, 
                 folder.add(lines, answer)
                 progress(len(found), len(GROUPS), job.group)
     rows = [row for group in GROUPS for row in found[group].rows]
-    return {"machine": _machine(), "seed": seed, "repeat": repeat, "rows": rows}
+    report = {"machine": _machine(), "seed": seed, "repeat": repeat, "rows": rows}
+    replace_file(out / f"{KIND}.csv", table(report).csv().encode())
+    return report
+
+
+def table(report: dict[str, Any]) -> Table:
+    """What `measure` found, with each median over its aim."""
+    machine = report["machine"]
+    return Table(
+        KIND,
+        "Speed",
+        ("what", "median", "least", "most", "unit", "aim", "median / aim"),
+        tuple(_cells(row) for row in report["rows"]),
+        f"{machine['processor']}, {machine['cores']} cores, {machine['platform']}",
+    )
+
+
+def _cells(row: dict[str, Any]) -> tuple[str, ...]:
+    aim = row["aim"]
+    return (
+        row["what"],
+        *(f"{row[name]:.2f}" for name in ("median", "least", "most")),
+        row["unit"],
+        "" if aim is None else f"{aim:g}",
+        "" if aim is None else f"{row['median'] / aim:.2f}",
+    )
 
 
 def take(job: Timing) -> Timed:
