@@ -83,8 +83,12 @@ def test_a_quick_experiment_is_a_balanced_tenth() -> None:
         for of in (*CASE_SETS, *FURTHER_SETS):
             every = cases(of, "test", further=True)
             found = {r.case for r in some if r.case.set == of and r.profile == "honest"}
-            share = {quick: 0.1}.get(some, 1.0) if of == "undisturbed" else part
-            assert len(found) == max(1, round(len(every) * share))
+            if of == "undisturbed":
+                others = {r.case for r in some if r.profile == "honest"} - found
+                assert found >= {c.twin for c in others if c.twin.set == of}
+                assert len(found) <= max(1, len(others))
+                continue
+            assert len(found) == max(1, round(len(every) * part))
             assert len({c.task for c in found}) == min(len(found), len({c.task for c in every}))
         assert len({r.case.task for r in some if r.profile == "kind"}) >= 4, "not one task alone"
     assert {r.case for r in quick} <= {r.case for r in usual} <= {r.case for r in whole}
@@ -308,7 +312,7 @@ def test_a_quick_experiment_has_every_strategy_and_model_and_fewer_demonstration
     assert {r.demonstrations for r in honest[1]} == {"8 varied"}
     of = Choice("all", quick=True, demonstrations=4).runs()
     assert "4 varied" in {r.demonstrations for r in of}, "as was said"
-    assert len(quick) * 5 < len(usual)
+    assert len(quick) * 4 < len(usual)
 
 
 def test_in_a_transfer_nobody_has_shown_the_task_at_hand() -> None:

@@ -20,13 +20,11 @@ MADE = Path(__file__).parents[1] / "fuzz" / "corpus" / "results" / "all"
 Edit = Callable[[dict[str, Any]], object]
 
 LINES: list[tuple[str, Edit | str, str]] = [
-    (EFFORT, lambda d: d.pop("choice"), "effort.jsonl, line 1: choice: Field required"),
-    (EFFORT, lambda d: d["choice"].pop("limit"), "effort.jsonl, line 1: choice.limit: Field req"),
-    (EFFORT, lambda d: d.update(choice="\x1b[31m"), "effort.jsonl, line 1: choice: "),
-    (EFFORT, lambda d: d["choice"].update(sets=1e308), "choice.sets: Input should be a valid list"),
-    (EFFORT, lambda d: d["choice"].update(strategies=[None]), "choice.strategies.0"),
-    (EFFORT, lambda d: d["choice"].update(split="tomorrow"), "unknown split 'tomorrow'"),
-    (EFFORT, lambda d: d["choice"].update(rounds=10**18), "seeds for each scenario"),
+    (EFFORT, lambda d: d.pop("asked"), "effort.jsonl, line 1: asked: Field required"),
+    (EFFORT, lambda d: d["asked"][0].pop("set"), "effort.jsonl, line 1: asked.0.set: Field req"),
+    (EFFORT, lambda d: d.update(asked="\x1b[31m"), "effort.jsonl, line 1: asked: "),
+    (EFFORT, lambda d: d["asked"][0].update(episodes=1e308), "asked.0.episodes: "),
+    (EFFORT, lambda d: d["asked"][0].update(strategy=[None]), "asked.0.strategy: "),
     (EFFORT, lambda d: d.update(machine=7), "machine: Input should be a valid string, got 7"),
     (EFFORT, lambda d: d.update(seconds="2"), "seconds: Input should be a valid number"),
     (EFFORT, "{}", "effort.jsonl, line 1: jobs: Field required"),

@@ -41,7 +41,7 @@ class Options:
         profiles: of the household: honest (motions go wrong, the domain file does not know all) or
             kind. Honest by default, both for `all`.
         part: of the cases of each set in `all`, from all tasks in turn; 0.05 by default, which is
-            over an hour on two cores, 1 for every case, which takes many.
+            an hour on two cores, 1 for every case, which takes many.
         quick: a tenth of it, with fewer demonstrations and fewer strategies on each case: by
             its own reckoning a quarter of an hour.
         demonstrations: of each task in the honest household, each another way to do it (1 to 32);

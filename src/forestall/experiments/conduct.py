@@ -116,7 +116,10 @@ def conduct(
             if announce is not None:
                 announce(_cost(todo, experiment))
             with folder.effort_of(
-                experiment.choice, experiment.workers, experiment.engine
+                experiment.choice,
+                ((run.case.set, run.setup) for run in runs),
+                experiment.workers,
+                experiment.engine,
             ) as count:
                 (demonstrate or _demonstrations)(todo, experiment, progress)
                 before = len(runs) - len(todo)

@@ -12,7 +12,8 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,10 +21,10 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
-from forestall.experiments.runs import Choice
 from forestall.experiments.stored import (
     PACKED,
     AnyAbout,
+    Asked,
     Call,
     ExperimentAbout,
     ExperimentCall,
@@ -33,7 +34,7 @@ from forestall.files import alone, make_folder, replace_file
 from forestall.fingerprint import ROW_MAKING, sources_digest, weights_of
 from forestall.reading.documents import read_json
 from forestall.reading.models import validated
-from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
+from forestall.statistics.rows import ROW_FORMAT, EpisodeRow, Setup
 
 EXPERIMENT = "experiment"
 ABOUT = "experiment.json"
@@ -202,13 +203,32 @@ class ResultsFolder(Generic[R]):
             lines.flush()
 
     @contextmanager
-    def effort_of(self, choice: Any, workers: int, engine: str) -> Iterator[Callable[[int], None]]:
+    def effort_of(
+        self, choice: Any, asked: Iterable[tuple[str, Setup]], workers: int, engine: str
+    ) -> Iterator[Callable[[int], None]]:
         """Write down what a call of the command was for, and at its end what it did and where.
 
-        Yields what is to be told how many episodes are done.
+        Args:
+            choice: what was said on the command line.
+            asked: set and setup of every episode that this means, those that are there included.
+            workers: how many at once.
+            engine: of what kind.
+
+        Yields:
+            What is to be told how many episodes are done.
         """
         about = {
             "choice": asdict(choice),
+            "asked": [
+                {
+                    "set": of,
+                    "profile": setup.profile,
+                    "strategy": setup.strategy,
+                    "setup": setup.name,
+                    "episodes": count,
+                }
+                for (of, setup), count in Counter(asked).items()
+            ],
             "jobs": workers,
             "engine": engine,
             "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.platform()}",
@@ -246,25 +266,14 @@ class ResultsFolder(Generic[R]):
             "date": ", ".join(sorted({c.date for c in calls})),
         }
 
-    def asked(self) -> list[Choice]:
-        """What the command was called for, each once."""
-        choices = [
-            Choice(
-                c.experiment,
-                c.split,
-                c.rounds,
-                c.limit,
-                tuple(c.sets),
-                tuple(c.strategies),
-                tuple(c.profiles),
-                c.part,
-                c.quick,
-                c.demonstrations,
-                c.models,
-            )
-            for c in (call.choice for call in self._calls(ExperimentCall))
-        ]
-        return list(dict.fromkeys(choices))
+    def asked(self) -> list[Asked]:
+        """What calls wanted: of each kind the most that one did, for the less is in the more."""
+        most: dict[tuple[str, str], Asked] = {}
+        for asked in (a for call in self._calls(ExperimentCall) for a in call.asked):
+            before = most.get((asked.set, asked.setup))
+            if before is None or before.episodes < asked.episodes:
+                most[asked.set, asked.setup] = asked
+        return list(most.values())
 
     def _calls(self, model: type[C]) -> list[C]:
         file = self.path / EFFORT

@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError, InputError
-from forestall.experiments.folder import EXPERIMENT, About, ResultsFolder, episodes_in
-from forestall.experiments.runs import runs_for
+from forestall.experiments.folder import ResultsFolder, episodes_in
 from forestall.experiments.worker import PAGES
 from forestall.files import make_folder, replace_file
-from forestall.kinds import CAPTIONER, IMAGE_ENCODER, STORE
+from forestall.kinds import CAPTIONER, IMAGE_ENCODER
 from forestall.report.experiment_page import write_experiment
 from forestall.statistics.cases import Case, cases
 from forestall.statistics.findings import findings
@@ -120,43 +119,21 @@ def calibration_of(path: Path, about: dict[str, Any]) -> list[EpisodeRow]:
 def _missing(
     folder: ResultsFolder[EpisodeRow], about: dict[str, Any], rows: Sequence[EpisodeRow]
 ) -> list[str]:
-    """What was asked for and is not there, and what was not asked for.
-
-    Which episodes a call asks for is the code's affair: of results of other code only what is there
-    is known, and nothing is said to be missing.
-    """
-    wanted = {run.key: run for choice in folder.asked() for run in runs_for(choice)}
+    """What was asked for and is not there, and what was not asked for."""
+    there = Counter((row.set, row.setup.name) for row in rows)
+    lacking: Counter[str] = Counter()
+    for asked in folder.asked():
+        what = f"{asked.strategy} on {asked.set}, {asked.profile}"
+        lacking[what] += max(0, asked.episodes - there[asked.set, asked.setup])
+    notes = [f"missing: {n} episodes of {what}" for what, n in sorted(lacking.items()) if n]
     used: dict[tuple[str, str], set[Case]] = {}
-    notes: list[str] = []
-    if not _of_this_code(about):
-        for row in rows:
-            used.setdefault((row.profile, row.set), set()).add(
-                Case(row.set, row.task, row.scenario, row.seed)
-            )
-    else:
-        lacking = Counter(
-            f"{run.strategy} on {run.case.set}, {run.profile}"
-            for run in (wanted[key] for key in wanted.keys() - {row.key for row in rows})
-        )
-        notes = [f"missing: {n} episodes of {what}" for what, n in sorted(lacking.items())]
-        for run in wanted.values():
-            used.setdefault((run.profile, run.case.set), set()).add(run.case)
-    for (profile, of), there in sorted(used.items()):
+    for row in rows:
+        used.setdefault((row.profile, row.set), set()).add(row.case)
+    for (profile, of), found in sorted(used.items()):
         whole = len(cases(of, about["split"], about["rounds"], further=profile == HONEST))
-        if len(there) < whole:
-            notes.append(f"asked for: {len(there)} of {whole} cases of {of}, {profile}")
+        if len(found) < whole:
+            notes.append(f"run: {len(found)} of {whole} cases of {of}, {profile}")
     return notes
-
-
-def _of_this_code(about: dict[str, Any]) -> bool:
-    """Whether the code at hand would make these results, with the memory that was given."""
-    store = about["settings"]["parts"].get(STORE.name, {})
-    memory = {**store.get("defaulted", {}), **store.get("given", {})}.get("path")
-    try:
-        now = About.now(EXPERIMENT, {"settings": about["settings"]}, memory)
-    except OSError:  # the memory is no longer there
-        return False
-    return now.sources == str(about["sources"])
 
 
 def shown_names(settings: dict[str, Any]) -> dict[str, str]:

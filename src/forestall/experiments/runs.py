@@ -59,8 +59,8 @@ DEMONSTRATIONS = 8
 """Of each task in the honest household."""
 
 PART = 0.05
-"""Of the cases of each set in "all": little more than an hour on two cores. The
-undisturbed runs of the honest household are all among them: they are every other case's twin."""
+"""Of the cases of each set in "all": an hour on two cores. Of the undisturbed runs of the honest
+household there are all that are another case's twin, too."""
 
 STEPPING_IN = 1 / 6
 """Of these, in the honest household, those in which strategies step in."""
@@ -88,7 +88,7 @@ PAPER_DETECTOR = "scene-graph"
 T = TypeVar("T")
 
 _WITH_PART = ("transfer", "all")
-"""Experiments that take a part of every set, and all undisturbed runs of the honest household."""
+"""Experiments that take a part of every set."""
 
 _ELSEWHERE = " of other tasks"
 """Ends what is said of a memory that has none of the task at hand."""
@@ -308,14 +308,17 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
     found = {}
     for place, of in enumerate((*CASE_SETS, *FURTHER_SETS) if honest else CASE_SETS):
         every: Sequence[Case] = cases(of, choice.split, choice.rounds, further=honest)
-        whole = choice.experiment not in _WITH_PART or (honest and of == UNDISTURBED)
-        part = 1.0 if whole else choice.part
+        part = choice.part if choice.experiment in _WITH_PART else 1.0
         if choice.quick:
             part *= QUICK
         if part < 1:
             every = _some(every, part, TURN * place if honest else 0, place)
-        found[of] = in_turn(every, choice.limit)
-    return found
+        found[of] = every
+    if honest:
+        chosen = {c.twin for several in found.values() for c in several}
+        every = cases(UNDISTURBED, choice.split, choice.rounds, further=True)
+        found[UNDISTURBED] = [c for c in every if c in chosen]
+    return {of: in_turn(several, choice.limit) for of, several in found.items()}
 
 
 def _some(found: Sequence[Case], part: float, turn: int = 0, task: int = 0) -> Sequence[Case]:

@@ -54,20 +54,22 @@ class ExperimentAbout(AnyAbout):
     settings: _Settings
 
 
-class Chosen(_Model):
-    """Which episodes a call wanted: the fields of `runs.Choice`."""
+class Asked(_Model):
+    """How many episodes of one kind a call wanted, those that were there included.
 
-    experiment: str
-    split: str
-    rounds: int
-    limit: int | None
-    sets: list[str]
-    strategies: list[str]
-    profiles: list[str]
-    part: float
-    quick: bool
-    demonstrations: int | None
-    models: bool = False
+    Args:
+        set: of cases.
+        profile: of the household.
+        strategy: who watches.
+        setup: all that is known of who watches, in one word.
+        episodes: how many.
+    """
+
+    set: str
+    profile: str
+    strategy: str
+    setup: str
+    episodes: int = Field(ge=1)
 
 
 class Call(_Model):
@@ -83,9 +85,9 @@ class Call(_Model):
 
 
 class ExperimentCall(Call):
-    """The same of one of the paper's experiments."""
+    """The same of one of the paper's experiments, with what it was for."""
 
-    choice: Chosen
+    asked: list[Asked]
 
 
 def lines_of(file: Path) -> tuple[list[tuple[str, Any]], str, str]:

@@ -72,7 +72,12 @@ class Setup:
 
     def key(self, case: Case) -> str:
         """The key of an episode: readable, unique within an experiment, fit for a folder's name."""
-        parts = [case.scenario or f"undisturbed-{case.task}", str(case.seed), self.strategy]
+        return f"{case.scenario or f'undisturbed-{case.task}'}_{case.seed}_{self.name}"
+
+    @property
+    def name(self) -> str:
+        """All of it that tells it from others, in one word."""
+        parts = [self.strategy]
         if self.strategy not in NOBODY:
             parts += [self.detector, f"{self.threshold:.2f}"]
         parts += [f"without-{self.without}"] if self.without else []
@@ -222,7 +227,12 @@ class EpisodeRow:
     @property
     def key(self) -> str:
         """What makes an episode the same one within an experiment."""
-        return self.setup.key(Case(self.set, self.task, self.scenario, self.seed))
+        return self.setup.key(self.case)
+
+    @property
+    def case(self) -> Case:
+        """What was to be done, where, and what was to go wrong."""
+        return Case(self.set, self.task, self.scenario, self.seed)
 
     @property
     def setup(self) -> Setup:
