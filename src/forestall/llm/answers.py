@@ -51,11 +51,16 @@ def _text(description: str) -> dict[str, Any]:
     return {"type": "string", "description": description}
 
 
-def diagnosis_schema(things: Collection[str]) -> str:
-    """The schema of an explanation; what it is because of is one of the things at hand."""
+def diagnosis_schema(things: Collection[str], steps: Collection[int] = ()) -> str:
+    """The schema of an explanation; what it is because of is one of the things at hand.
+
+    With some steps it also names the one that it is about.
+    """
     among = {"type": "string", "enum": sorted(things)} if things else {"type": "string"}
+    step = {"step": {"type": "integer", "enum": sorted(steps)}} if steps else {}
     return json.dumps(
         _object(
+            **step,
             cause=_text("what is wrong, one sentence"),
             why=_text("how that makes the step fail, one sentence"),
             because_of=_list(among),
@@ -65,6 +70,20 @@ def diagnosis_schema(things: Collection[str]) -> str:
         ),
         sort_keys=True,
     )
+
+
+def verified_schema() -> str:
+    """The schema of whether a step did what it is for."""
+    return json.dumps(_object(why=_text("one sentence"), done={"type": "boolean"}), sort_keys=True)
+
+
+def verified(answer: str) -> tuple[bool, str]:
+    """Whether a step did what it is for, and why.
+
+    Raises:
+        Unfit: the answer cannot be read.
+    """
+    return _read(answer, lambda field: (field["done"].flag(), line(field["why"].text())))
 
 
 def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
@@ -142,6 +161,24 @@ def explanation(answer: str, graph: SceneGraph, domain: Domain) -> Explained:
         Unfit: it is none, or says nothing.
     """
     return _read(answer, lambda field: _explained(field, graph, domain))
+
+
+def located(
+    answer: str, numbers: Collection[int], graph: SceneGraph, domain: Domain
+) -> tuple[int, Explained]:
+    """Read an explanation that names the step of a run that it is about, by its number.
+
+    Raises:
+        Unfit: it is none, says nothing, or there is no such step.
+    """
+
+    def read(field: Field) -> tuple[int, Explained]:
+        number = field["step"].whole()
+        if number not in numbers:
+            raise Unfit(f"there is no step {number}: the run has {len(numbers)}")
+        return number, _explained(field, graph, domain)
+
+    return _read(answer, read)
 
 
 def _explained(field: Field, graph: SceneGraph, domain: Domain) -> Explained:
