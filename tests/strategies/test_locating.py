@@ -13,7 +13,7 @@ from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.exchange import Exchange
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-from forestall.types.runtime import BoundaryContext, When
+from forestall.types.runtime import BoundaryContext, StrategyAnswer, When
 from forestall.types.story import Located, Tried, Verified
 from forestall.types.verdict import Decision, Diagnosis
 
@@ -114,18 +114,19 @@ def test_post_hoc_asks_about_a_goal_that_is_missed_and_once() -> None:
 
 def during(
     parts: Parts, locator: Told, outcome: SkillOutcome = DONE, subtask: Subtask = PLAN.subtasks[1]
-) -> tuple[object, Online]:
+) -> tuple[StrategyAnswer, Parts]:
     strategy = Online(parts, parts, parts, parts, parts, scope, locator=locator)
     strategy.before_subtask(boundary(subtask=subtask))
     at = boundary(When.AFTER, may_look=False, subtask=subtask, graph=BEFORE)
-    return strategy.after_subtask(at, outcome), strategy
+    return strategy.after_subtask(at, outcome), parts
 
 
 def test_online_goes_on_where_the_subtask_did_what_it_is_for() -> None:
     parts, locator = Parts(Decision.REPLAN, (OPEN,)), Told()
     answer, _ = during(parts, locator)
-    assert answer.decision is Decision.PROCEED and not parts.judged  # type: ignore[attr-defined]
-    verdict = answer.verdict  # type: ignore[attr-defined]
+    assert answer.decision is Decision.PROCEED and not parts.judged
+    verdict = answer.verdict
+    assert verdict is not None
     assert (verdict.detector, verdict.decision) == (VERIFIED, Decision.PROCEED)
     assert [e.purpose for e in verdict.exchanges] == ["verifying"]
 
@@ -133,8 +134,8 @@ def test_online_goes_on_where_the_subtask_did_what_it_is_for() -> None:
 def test_online_explains_what_did_not_and_goes_on_behind_it() -> None:
     parts, locator = Parts(Decision.PROCEED), Told("put_in", says=SAYS)
     answer, _ = during(parts, locator)
-    assert answer.decision is Decision.REPLAN  # type: ignore[attr-defined]
-    assert answer.diagnosis == SAYS and not parts.asked  # type: ignore[attr-defined]
+    assert answer.decision is Decision.REPLAN
+    assert answer.diagnosis == SAYS and not parts.asked
     assert parts.replanned_at == 2
     ((_, failed),) = locator.explained
     assert failed is not None and failed.status is SkillStatus.SUCCEEDED
@@ -144,22 +145,23 @@ def test_online_words_alone_get_their_facts_from_the_check_of_the_plan() -> None
     says = replace(SAYS, must_change=())
     parts = Parts(Decision.PROCEED, rest_runs=False)
     answer, _ = during(parts, Told("put_in", says=says))
-    found = answer.diagnosis  # type: ignore[attr-defined]
-    assert found.advice == "open it" and found.must_change == (HOT,)
+    found = answer.diagnosis
+    assert found is not None and found.advice == "open it" and found.must_change == (HOT,)
 
 
 def test_online_explains_what_the_robot_refused_from_the_story() -> None:
     parts, locator = Parts(Decision.PROCEED), Told(says=SAYS)
     answer, _ = during(parts, locator, REFUSED)
     assert not locator.verified and len(locator.explained) == 1
-    assert answer.diagnosis == SAYS and not parts.asked  # type: ignore[attr-defined]
+    assert answer.diagnosis == SAYS and not parts.asked
 
 
 def test_online_compares_where_nobody_can_say_and_after_driving() -> None:
     parts, locator = Parts(Decision.PROCEED), Told(knows=False)
     answer, _ = during(parts, locator)
-    assert parts.judged and answer.verdict.detector == "scripted"  # type: ignore[attr-defined]
-    assert [e.purpose for e in answer.verdict.exchanges] == ["verifying"]  # type: ignore[attr-defined]
+    assert parts.judged and answer.verdict is not None
+    assert answer.verdict.detector == "scripted"
+    assert [e.purpose for e in answer.verdict.exchanges] == ["verifying"]
     parts, locator = Parts(Decision.PROCEED), Told("navigate_to_obj")
     during(parts, locator, subtask=DRIVE)
     assert parts.judged and not locator.verified

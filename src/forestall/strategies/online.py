@@ -21,7 +21,7 @@ from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
-from forestall.types.story import Verified
+from forestall.types.story import Located, Verified
 from forestall.types.verdict import Decision, Diagnosis, Reference, Verdict, scenes
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
@@ -97,16 +97,16 @@ class Online:
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
         """Did the subtask succeed? On a failure diagnose and replan."""
         clock = Clock()
-        if context.looks == 1:
-            self._story.tried(context.subtask, outcome.status)
-        self._story.saw(context.graph)
+        if self._locator is not None:
+            self._story.tried(context, outcome.status)
+            self._story.saw(context.graph)
         if outcome.status is not SkillStatus.SUCCEEDED:
             return self._failed(context, outcome.status, clock)
         onward = replace(context, index=context.index + 1)
         asked: tuple[Exchange, ...] = ()
         if self._locator is not None and self._story.is_subgoal(self._story.told[-1]):
             found = self._locator.verify(context, self._story.told[-1])
-            clock.lap("verify")
+            clock.lap("compare")
             if found.satisfied is not None:
                 return self._by_locator(self._locator, found, onward, clock)
             asked = found.exchanges
@@ -120,24 +120,20 @@ class Online:
         verdict = replace(checked(VERIFIED, done, found.why), exchanges=found.exchanges)
         if done:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
-        diagnosis = self._explained(locator, onward, found.why)
-        if not diagnosis.must_change:  # words alone: what fails tells a planner what to do
-            missing = self._intervention.why_not(onward, clock)
-            if missing is not None:
-                diagnosis = replace(
-                    diagnosis, must_change=missing.must_change, refusal=missing.refusal
-                )
+        told = self._located(locator, onward)
+        diagnosis = told.diagnosis or Diagnosis(
+            f"{onward.subtask} did not do what it is for: {found.why}",
+            (),
+            producer=locator.name,
+            exchanges=told.exchanges,
+        )
+        diagnosis = self._with_facts(diagnosis, onward, clock) or diagnosis
         clock.lap("diagnose")
         return self._intervention.alarm(onward, verdict, diagnosis, clock)
 
-    def _explained(self, locator: AskedLocator, context: BoundaryContext, why: str) -> Diagnosis:
+    def _located(self, locator: AskedLocator, context: BoundaryContext) -> Located:
         """Why the newest subtask went wrong, from the story until then."""
-        told = locator.explain(context, tuple(self._story.told), self._story.told[-1])
-        if told.diagnosis is not None:
-            return told.diagnosis
-        cause = f"{self._story.told[-1].subtask} did not do what it is for"
-        cause = f"{cause}: {why}" if why else cause
-        return Diagnosis(cause, (), producer=locator.name, exchanges=told.exchanges)
+        return locator.explain(context, tuple(self._story.told), self._story.told[-1])
 
     def _compared(
         self, context: BoundaryContext, onward: BoundaryContext, clock: Clock
@@ -180,18 +176,32 @@ class Online:
             references = self._references(context)
             clock.lap("retrieve")
             needs = replace(context, references=references, when=When.BEFORE)
-            if self._locator is None:
+            told = None if self._locator is None else self._located(self._locator, context)
+            diagnosis = None if told is None else told.diagnosis
+            if diagnosis is None:
                 diagnosis = self._reasoner.diagnose(needs, verdict)
-            else:
-                diagnosis = self._explained(self._locator, context, _SAID[status])
+                asked = () if told is None else told.exchanges
+                diagnosis = replace(diagnosis, exchanges=(*asked, *diagnosis.exchanges))
             clock.lap("diagnose")
-        if diagnosis is None or not diagnosis.must_change:
-            diagnosis = self._intervention.why_not(context, clock) or diagnosis
+        diagnosis = self._with_facts(diagnosis, context, clock)
         if diagnosis is None:
             diagnosis = Diagnosis(f"nothing is seen that stands against {context.subtask}", ())
         if not diagnosis.must_change and context.may_look:
             return look_again(verdict, clock, diagnosis.cause)
         return self._intervention.alarm(context, verdict, diagnosis, clock)
+
+    def _with_facts(
+        self, diagnosis: Diagnosis | None, context: BoundaryContext, clock: Clock
+    ) -> Diagnosis | None:
+        """Where a diagnosis names no fact, those that the check of the plan lacks; words stay."""
+        if diagnosis is not None and diagnosis.must_change:
+            return diagnosis
+        missing = self._intervention.why_not(context, clock)
+        if missing is None or diagnosis is None:
+            return missing or diagnosis
+        if not diagnosis.advice:
+            return replace(missing, exchanges=diagnosis.exchanges)
+        return replace(diagnosis, must_change=missing.must_change, refusal=missing.refusal)
 
     def _references(self, context: BoundaryContext) -> tuple[Reference, ...]:
         return scenes(self._retriever.retrieve(context.subtask, context.task.name, context.done))

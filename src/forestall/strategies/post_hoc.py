@@ -86,10 +86,11 @@ class PostHoc:
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Judge what is seen, keep it, go on."""
         self._intervention.begin(context)
-        if (context.index == 0 and context.replans == 0) or context.replans != self._replans:
-            self._story.begin()
-        self._replans = context.replans
-        self._story.saw(context.graph)
+        if self._locator is not None:
+            if context.replans != self._replans or (context.index == 0 and not context.replans):
+                self._story.begin()
+            self._replans = context.replans
+            self._story.saw(context.graph)
         if context.replans > 0:
             return _GO_ON
         if context.index == 0:
@@ -108,7 +109,8 @@ class PostHoc:
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
         """Keep whether the robot could do it, go on."""
-        self._story.tried(context.subtask, outcome.status)
+        if self._locator is not None:
+            self._story.tried(context, outcome.status)
         if outcome.status is not SkillStatus.SUCCEEDED:
             self._summary.failed.append((context, outcome.status))
         return _GO_ON
@@ -121,7 +123,6 @@ class PostHoc:
             return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
         if context.may_look:
             return look_again(verdict, clock, missed.cause)
-        self._story.saw(context.graph)
         diagnosis = self._located(context, missed)
         clock.lap("diagnose")
         if context.replans >= self._max_attempts:
@@ -138,6 +139,7 @@ class PostHoc:
         """
         asked: tuple[Exchange, ...] = ()
         if self._locator is not None and at_end.replans < self._max_attempts:
+            self._story.saw(at_end.graph)
             told = self._story.located(self._locator, at_end)
             if told.diagnosis is not None:
                 return replace(

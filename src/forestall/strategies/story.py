@@ -34,14 +34,20 @@ class Story:
     def __init__(self, scope: Scope, domain: Domain) -> None:
         self._scope, self._domain = scope, domain
         self.told: list[Tried] = []
+        self._moment: tuple[int, ...] | None = None
 
     def begin(self) -> None:
         """Another run: what is known of the last one is forgotten."""
         self.told.clear()
+        self._moment = None
 
-    def tried(self, subtask: Subtask, status: SkillStatus) -> None:
-        """A step is over."""
-        self.told.append(Tried(len(self.told) + 1, subtask, status))
+    def tried(self, context: BoundaryContext, status: SkillStatus) -> None:
+        """A step is over; told again of the same one, what is seen from now on counts."""
+        moment = (context.index, context.replans, len(context.executed))
+        if moment == self._moment and self.told:
+            self.told.pop()
+        self._moment = moment
+        self.told.append(Tried(len(self.told) + 1, context.subtask, status))
 
     def saw(self, graph: SceneGraph) -> None:
         """Something was seen: of the step before it, where nothing was yet."""
