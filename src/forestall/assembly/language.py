@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from forestall.assembly.configuration import Given
-from forestall.assembly.kept import picture_of
 from forestall.assembly.registry import known
 from forestall.diagnosis.model import ModelReasoner
 from forestall.errors import InputError
@@ -84,6 +83,8 @@ def model_reasoner(
 
 def _pictures(parts: Parts) -> Callable[[Reference], Rgb | None] | None:
     """The pictures of the run's memory; None where it is the ready-made one, which keeps none."""
+    from forestall.assembly.kept import picture_of
+
     path = parts.options(STORE).get("path")
     if path is None:
         return None
