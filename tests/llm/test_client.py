@@ -112,6 +112,14 @@ def test_of_a_stream_that_is_cut_what_came_is_kept_and_is_no_answer(size: int, h
     assert bool(found.answer) == (size > 500), (found.answer, found.problem)
 
 
+def test_a_stream_that_has_ended_is_not_waited_for() -> None:
+    started = time.monotonic()
+    open_end = dataclasses.replace(STREAM, pieces=(WHOLE, b""), pause_s=15.0)
+    found, _ = asked(in_turn(open_end), stream=True, timeout_s=60)
+    assert found.answer == json.dumps(LONG) and found.seconds < 14
+    assert time.monotonic() - started < 60
+
+
 def test_a_stream_that_is_slow_costs_its_time_limit_and_keeps_what_came() -> None:
     started = time.monotonic()
     slow = dataclasses.replace(STREAM, pause_s=0.1)

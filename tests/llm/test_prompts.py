@@ -44,8 +44,8 @@ VALUES: dict[str, dict[str, Any]] = {
         "vocabulary": "on(A, B)", "pictures": "",
     },
     "replanning": {
-        "goal": "g", "cause": "c", "advice": "", "change": [], "stay": [], "refused": [],
-        "rest": "nothing", "holding": "nothing", "at": "A", "observed": [], "places": [],
+        "goal": "g", "cause": "c", "advice": "", "change": [], "stay": [], "never": [],
+        "refused": [], "rest": "nothing", "holding": "nothing", "at": "A", "observed": [], "places": [],
         "skills": ["put(thing)"],
     },
 }  # fmt: skip

@@ -21,6 +21,9 @@ from forestall.types.exchange import Request
 LONGEST = 300
 """Characters of somebody else's message."""
 
+STREAM_END = b"data: [DONE]\n"
+"""The last event of a stream."""
+
 
 class Form(Enum):
     """How an endpoint is told what an answer looks like."""

@@ -22,6 +22,7 @@ from forestall.deadline import Deadline
 from forestall.errors import InputError
 from forestall.llm.bodies import (
     LONGEST,
+    STREAM_END,
     Body,
     Form,
     answer_of,
@@ -240,6 +241,8 @@ class OpenAIModel:
                     body += piece
                     if len(body) > most:
                         return _Got(problem=f"the answer is larger than {most} bytes")
+                    if self._config.stream and STREAM_END in body[-len(piece) - len(STREAM_END) :]:
+                        break  # whether the endpoint hangs up or not
                     if limit.over:
                         return _Got(bytes(body), "the answer did not end in time", again=True)
                 return _Got(bytes(body))

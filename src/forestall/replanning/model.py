@@ -108,6 +108,7 @@ class ModelReplanner:
             advice=diagnosis.advice,
             change=[words.fact(x) for x in diagnosis.must_change],
             stay=[words.fact(x) for x in _worth_telling(diagnosis, domain)],
+            never=[words.fact(_plain(x)) for x in context.task.goal.never],
             refused=[words.step(s) for s in context.refused],
             rest="; ".join(map(words.step, context.remaining())) or _done(context),
             holding=", ".join(words.name(h) for _, h in state.in_hands()) or "nothing",
@@ -269,6 +270,11 @@ def _worth_telling(diagnosis: Diagnosis, domain: Domain) -> Sequence[Literal]:
     """Of what must stay the few that a short prompt has room for: how things lie."""
     moved = set(domain.containing)
     return [x for x in diagnosis.must_stay if x.predicate in moved and x.value == "true"][:3]
+
+
+def _plain(fact: Literal) -> Literal:
+    """A fact of a goal without the marks of its variables."""
+    return Literal(fact.predicate, tuple(a.removeprefix("?") for a in fact.args), fact.value)
 
 
 def _done(context: BoundaryContext) -> str:

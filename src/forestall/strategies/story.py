@@ -57,8 +57,7 @@ class Story:
 
     def is_subgoal(self, tried: Tried) -> bool:
         """Whether a step does more than drive."""
-        skill = self._domain.skills.get(tried.subtask.skill)
-        return skill is None or not skill.drives
+        return not self._domain.drives(tried.subtask)
 
     def located(self, locator: AskedLocator, context: BoundaryContext) -> Located:
         """Where and why the run failed; without a diagnosis where the locator could not say."""
