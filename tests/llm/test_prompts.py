@@ -45,8 +45,8 @@ VALUES: dict[str, dict[str, Any]] = {
     },
     "replanning": {
         "goal": "g", "cause": "c", "advice": "", "change": [], "stay": [], "never": [],
-        "refused": [], "rest": "nothing", "holding": "nothing", "at": "A", "observed": [], "places": [],
-        "skills": ["put(thing)"],
+        "refused": [], "rest": "nothing", "holding": "nothing", "at": "A", "observed": [],
+        "places": [], "skills": ["put(thing)"],
     },
 }  # fmt: skip
 
