@@ -98,7 +98,7 @@ def fitted(reply: Reply, body: dict[str, Any]) -> Reply:
     try:
         told = json.loads(reply.pieces[0])
         message = told["choices"][0]["message"]
-    except (ValueError, LookupError, TypeError):
+    except (ValueError, LookupError, TypeError, RecursionError):
         return reply
     if "tools" in body and message["content"] is not None:
         function = {"name": purpose_of(body), "arguments": message["content"]}

@@ -122,11 +122,11 @@ def test_a_stream_that_has_ended_is_not_waited_for() -> None:
 
 def test_a_stream_that_is_slow_costs_its_time_limit_and_keeps_what_came() -> None:
     started = time.monotonic()
-    slow = dataclasses.replace(STREAM, pause_s=0.1)
-    found, _ = asked(in_turn(slow), stream=True, timeout_s=1.5)
-    assert found.problem and found.seconds < 3.0 and time.monotonic() - started < 20
+    slow = dataclasses.replace(STREAM, pause_s=0.3)
+    found, _ = asked(in_turn(slow), stream=True, timeout_s=5)
+    assert found.problem and found.seconds < 10 and time.monotonic() - started < 40
     assert found.answer and json.dumps(LONG).startswith(found.answer)
-    assert "in time" in found.problem or "within 1.5 s" in found.problem
+    assert "in time" in found.problem or "within 5 s" in found.problem
 
 
 @pytest.mark.parametrize(

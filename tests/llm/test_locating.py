@@ -132,8 +132,8 @@ def test_a_whole_run_by_reflects_questions_alone(strategy: str) -> None:
     purposes = [e.purpose for b in record.boundaries for e in exchanges_of(b)]
     assert record.success == plain.success
     assert "locating" in purposes and "replanning" in purposes
-    assert [str(e.subtask) for e in record.executed] == [str(e.subtask) for e in plain.executed]
-    if strategy == "post-hoc":
+    if strategy == "post-hoc":  # driving is not verified, so that online finds it a step later
+        assert [e.subtask for e in record.executed] == [e.subtask for e in plain.executed]
         assert purposes[0] == "verifying" and purposes.index("locating") == purposes.count(
             "verifying"
         )
