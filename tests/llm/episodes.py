@@ -33,14 +33,9 @@ def memory(task: str, kitchen: bool = False) -> Sequence[Demonstration]:
     return [record_one(RecordingJob(task, seed, world)) for seed in seeds]
 
 
-def played(
-    task: str,
-    scenario: str | None,
-    llm: str | None = None,
-    kitchen: bool = False,
-    **parts: Any,
-) -> EpisodeRecord:
-    """One run; `llm` as the flag says it."""
+def played(task: str, scenario: str | None, llm: str | None = None, **parts: Any) -> EpisodeRecord:
+    """One run; `llm` as the flag says it, `kitchen=True` in the kitchen."""
+    kitchen = bool(parts.pop("kitchen", False))
     given = Given.named(parts).over(said_llm(llm)).over(Given() if kitchen else SYMBOLIC)
     config = run_config(task, scenario, seed=SEED, given=given)
     return run_episode(prepare(config), memory(task, kitchen))
@@ -78,7 +73,7 @@ def good_model(
     task: str, scenario: str, kitchen: bool = False
 ) -> Iterator[tuple[Scripted, EpisodeRecord]]:
     """A server with good answers for a scenario, and the planner's own run."""
-    record = played(task, scenario, None, kitchen)
+    record = played(task, scenario, kitchen=kitchen)
     with serving(good_script(record)) as server:
         yield server, record
 

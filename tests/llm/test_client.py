@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import time
+from typing import Any
 
 import pytest
 
@@ -25,7 +26,7 @@ def key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_PROXY", "*")
 
 
-def asked(script: Script, **options: object) -> tuple[Exchange, list[dict[str, object]]]:
+def asked(script: Script, **options: object) -> tuple[Exchange, list[dict[str, Any]]]:
     with serving(script) as server:
         config = ClientConfig(model="m", base_url=server.url, **options)  # type: ignore[arg-type]
         return OpenAIModel(config).ask(REQUEST), server.asked
@@ -68,7 +69,7 @@ def test_pictures_go_with_the_first_message_of_the_user() -> None:
 def test_an_endpoint_without_schemas_is_told_in_words() -> None:
     _, bodies = asked(in_turn(said("{}")), form=Form.TEXT, temperature=None)
     assert "response_format" not in bodies[0] and "temperature" not in bodies[0]
-    assert '{"type": "object"}' in bodies[0]["messages"][0]["content"]  # type: ignore[index]
+    assert '{"type": "object"}' in bodies[0]["messages"][0]["content"]
 
 
 LONG = {"cause": "a bowl — ü", "why": "x" * 300}
@@ -82,9 +83,9 @@ def test_an_answer_is_the_same_in_every_form_whole_or_streamed(form: Form, strea
     assert (found.answer, found.problem) == (json.dumps(LONG), "")
     assert (found.prompt_tokens, found.answer_tokens) == (300, 50)
     assert ("stream" in body, "stream_options" in body) == (stream, stream)
-    assert ("tools" in body) == (form is Form.TOOL)
-    if form is Form.TOOL:
-        (tool,) = body["tools"]  # type: ignore[attr-defined]
+    assert ("tools" in body) == (form is Form.FUNCTION)
+    if form is Form.FUNCTION:
+        (tool,) = body["tools"]
         assert tool["function"]["name"] == "reasoning"
         assert tool["function"]["parameters"] == {"type": "object"}
         assert body["tool_choice"] == {"type": "function", "function": {"name": "reasoning"}}
@@ -94,7 +95,7 @@ def test_a_tool_that_nobody_named_is_not_taken_for_an_answer() -> None:
     call = {"function": {"name": "os.system", "arguments": "{}"}}
     message = {"message": {"content": None, "tool_calls": [call]}}
     body = json.dumps({"choices": [message]}).encode()
-    found, _ = asked(lambda b: Reply(pieces=(body, b"")), form=Form.TOOL, retries=0)
+    found, _ = asked(lambda b: Reply(pieces=(body, b"")), form=Form.FUNCTION, retries=0)
     assert found.answer is None and "calls 'os.system', which it was not asked to" in found.problem
 
 

@@ -149,7 +149,7 @@ def test_whatever_is_answered_no_plan_goes_on_that_the_validator_did_not_accept(
                     max_tokens=10**9, stream=stream, form=form,
                 )
             )
-            for stream in (False, True) for form in (Form.SCHEMA, Form.TOOL)
+            for stream in (False, True) for form in (Form.SCHEMA, Form.FUNCTION)
         ]  # fmt: skip
         behind = PlannerReplanner(VALIDATOR, DOMAIN) if planner else None
         while answers < draws:

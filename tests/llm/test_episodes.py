@@ -66,7 +66,7 @@ def test_the_model_path_alone_solves_what_the_planner_solves(name: str) -> None:
 def test_in_the_kitchen_the_model_path_alone_does_what_the_planner_does(name: str) -> None:
     task = load_scenario(name).task
     with good_model(task, name, kitchen=True) as (server, by_planner):
-        record = played(task, name, server.url, True, **ALONE)
+        record = played(task, name, server.url, kitchen=True, **ALONE)
     assert record.success == by_planner.success
     replans = [b.replan for b in record.boundaries if b.replan is not None]
     assert replans and all(r.producer == "model" for r in replans if r.plan is not None)

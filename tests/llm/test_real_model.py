@@ -1,8 +1,8 @@
 """A whole run with a real model behind a real server: only where the environment names one.
 
 FORESTALL_TEST_LLM=http://localhost:8000/v1 names the endpoint, FORESTALL_TEST_LLM_FORM how it is
-told what an answer looks like (schema, tool, text; tool by default), FORESTALL_TEST_LLM_OUT a
-folder for the record. docs/llm.md says how a small model is started. Whatever it answers, no plan
+told what an answer looks like (schema, function, text; function by default), FORESTALL_TEST_LLM_OUT
+a folder for the record. docs/llm.md says how a small model is started. Whatever it answers, no plan
 goes on that the validator did not accept, and the planner solves what it does not.
 """
 
@@ -19,7 +19,7 @@ from forestall.report.page import page_html
 from llm.episodes import played
 
 ENDPOINT = os.environ.get("FORESTALL_TEST_LLM", "")
-FORM = os.environ.get("FORESTALL_TEST_LLM_FORM", "tool")
+FORM = os.environ.get("FORESTALL_TEST_LLM_FORM", "function")
 OUT = os.environ.get("FORESTALL_TEST_LLM_OUT", "")
 
 pytestmark = pytest.mark.skipif(not ENDPOINT, reason="FORESTALL_TEST_LLM names no endpoint")

@@ -29,7 +29,7 @@ class Form(Enum):
     """How an endpoint is told what an answer looks like."""
 
     SCHEMA = "schema"  # by a JSON schema of the answer
-    TOOL = "tool"  # by a function that it must call; its arguments are the answer
+    FUNCTION = "function"  # by a function that it must call; its arguments are the answer
     TEXT = "text"  # in words
 
 
@@ -65,14 +65,14 @@ def request_body(
         "model": model, "messages": messages, "max_tokens": request.max_tokens,
     }  # fmt: skip
     if temperature is not None:
-        body["temperature"] = temperature
+        body |= dict(temperature=temperature)
     if stream:
         body |= {"stream": True, "stream_options": {"include_usage": True}}
     name, schema = tool_name(request), json.loads(request.schema)
     if form is Form.SCHEMA:
         described = {"name": name, "strict": True, "schema": schema}
         body["response_format"] = {"type": "json_schema", "json_schema": described}
-    elif form is Form.TOOL:
+    elif form is Form.FUNCTION:
         function = {"name": name, "description": "Gives the answer.", "parameters": schema}
         body["tools"] = [{"type": "function", "function": function}]
         body["tool_choice"] = {"type": "function", "function": {"name": name}}

@@ -59,8 +59,8 @@ class ClientConfig:
         timeout_s: of one question, every further try and every pause between them included.
         retries: further tries after an answer that says "later", or none at all.
         temperature: of the model; None where the endpoint takes none.
-        form: how the endpoint is told what an answer looks like: a JSON schema, a tool to call, or
-            the text alone.
+        form: how the endpoint is told what an answer looks like: a JSON schema, a function to call,
+            or the text alone.
         stream: whether the answer comes piece by piece; of one that does not end in time, what came
             is kept.
         max_calls: tries of one run.
