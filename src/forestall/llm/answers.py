@@ -1,7 +1,8 @@
 """Schemas of answers, and answers read into types: whatever does not fit is a reason in words.
 
 Called by whoever asks a language model. An answer is checked against the domain and the scene, and
-nothing of it is ever called by its name.
+nothing of it is ever called by its name. The fields of a schema stand in the order in which they
+are to be thought of, since endpoints have them written in that order.
 """
 
 from __future__ import annotations
@@ -68,13 +69,12 @@ def diagnosis_schema(things: Collection[str], steps: Collection[int] = ()) -> st
             must_stay=_list(_text("a fact that must stay true")),
             advice=_text("what to do, one sentence"),
         ),
-        sort_keys=True,
     )
 
 
 def verified_schema() -> str:
     """The schema of whether a step did what it is for."""
-    return json.dumps(_object(why=_text("one sentence"), done={"type": "boolean"}), sort_keys=True)
+    return json.dumps(_object(why=_text("one sentence"), done={"type": "boolean"}))
 
 
 def verified(answer: str) -> tuple[bool, str]:
@@ -92,7 +92,7 @@ def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
         skill={"type": "string", "enum": sorted(skills)},
         args=_list({"type": "string", "enum": sorted(things)}),
     )
-    return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)), sort_keys=True)
+    return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)))
 
 
 def expectations_schema(numbers: Collection[int]) -> str:
@@ -102,12 +102,12 @@ def expectations_schema(numbers: Collection[int]) -> str:
         must_hold=_list(_text("a fact")),
         why=_text("one sentence"),
     )
-    return json.dumps(_object(steps=_list(step)), sort_keys=True)
+    return json.dumps(_object(steps=_list(step)))
 
 
 def explanation_schema() -> str:
     """The schema of one sentence for people."""
-    return json.dumps(_object(explanation=_text("one sentence")), sort_keys=True)
+    return json.dumps(_object(explanation=_text("one sentence")))
 
 
 def sentence_of(answer: str) -> str:
