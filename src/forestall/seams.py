@@ -33,6 +33,7 @@ from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.scene import SceneNeeds
+from forestall.types.story import Located, Tried, Verified
 from forestall.types.task import Goal
 from forestall.types.verdict import (
     Diagnosis,
@@ -439,6 +440,20 @@ class Reasoner(Protocol):
 
     def diagnose(self, context: BoundaryContext, verdict: Verdict) -> Diagnosis:
         """No `must_change` and no `advice`: nothing was found that must change."""
+
+
+class Locator(Protocol):
+    """Finds in what happened where a run went wrong, and says why (REFLECT's two stages)."""
+
+    name: str
+
+    def verify(self, context: BoundaryContext, tried: Tried) -> Verified:
+        """Whether a subtask did what it is for, by what was seen after it."""
+
+    def explain(
+        self, context: BoundaryContext, story: Sequence[Tried], failed: Tried | None
+    ) -> Located:
+        """Why a step failed; where none did, what is wrong with the plan."""
 
 
 class PlanValidator(Protocol):

@@ -145,6 +145,42 @@ def test_a_stale_correction_is_told(memory: Path, capsys: pytest.CaptureFixture[
     assert "not mined any more" in capsys.readouterr().err
 
 
+EXPECTED = """
+[[expected]]
+before = "{step}"
+task = "box the peg"
+facts = ["surface(?hole)=clean"]
+why = "chips fall through"
+source = "model"
+model = "small"
+"""
+
+
+def test_what_a_language_model_expects_is_listed_as_evidence_of_its_own(
+    memory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mined = rows(capsys, memory)
+    beside = memory.with_name("pegs.db.expected.toml")
+    beside.write_text(EXPECTED.format(step="insert(lid, hole, driver)"))
+    assert call(["preconditions", "list", str(memory), "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["rows"]
+    (own,) = (r for r in listed if r["origin"] == "expected by a language model")
+    assert [r for r in listed if r is not own] == list(mined.values())
+    assert (own["support"], own["demonstrations"], own["uses"]) == (0, 0, 0)
+    assert own["weight"] < 2 / 3 and own["kinds"] == ["insert(lid, hole, driver)"]
+    assert own["note"] == "small: chips fall through"
+    assert call(["preconditions", "list", str(memory), "--task", "box the peg"]) == 0
+    out = capsys.readouterr().out
+    assert "expected by a language model: small: chips" in out and out.count("insert") == 2
+    beside.write_text(EXPECTED.format(step="insert(peg, hole, driver)"))
+    assert call(["preconditions", "list", str(memory), "--expectations", str(beside)]) == 0
+    assert "no say, since a demonstration shows it" in capsys.readouterr().out
+    beside.write_text(EXPECTED.format(step="insrt(peg, hole, driver)"))
+    assert call(["preconditions", "list", str(memory)]) == 2
+    assert "did you mean insert" in capsys.readouterr().err
+    assert call(["preconditions", "list", str(memory), "--expectations", "none.toml"]) == 2
+
+
 def test_export_as_a_list_and_as_a_domain(
     memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,4 +1,7 @@
-"""Whole runs in the symbolic household, with a scripted server in the place of a model."""
+"""Whole runs in the symbolic household, with a scripted server in the place of a model.
+
+The same in the kitchen takes minutes a run: its pictures are drawn, and four demonstrations first.
+"""
 
 from __future__ import annotations
 
@@ -23,16 +26,19 @@ SEED = 10_003
 
 
 @cache
-def memory(task: str) -> Sequence[Demonstration]:
+def memory(task: str, kitchen: bool = False) -> Sequence[Demonstration]:
     """Four demonstrations, recorded once for all tests."""
     seeds = (DEMONSTRATION_SEEDS + 10 * k for k in range(4))
-    return [record_one(RecordingJob(task, seed, SYMBOLIC)) for seed in seeds]
+    world = Given() if kitchen else SYMBOLIC
+    return [record_one(RecordingJob(task, seed, world)) for seed in seeds]
 
 
 def played(task: str, scenario: str | None, llm: str | None = None, **parts: Any) -> EpisodeRecord:
-    """One run; `llm` as the flag says it."""
-    given = Given.named(parts).over(said_llm(llm)).over(SYMBOLIC)
-    return run_episode(prepare(run_config(task, scenario, seed=SEED, given=given)), memory(task))
+    """One run; `llm` as the flag says it, `kitchen=True` in the kitchen."""
+    kitchen = bool(parts.pop("kitchen", False))
+    given = Given.named(parts).over(said_llm(llm)).over(Given() if kitchen else SYMBOLIC)
+    config = run_config(task, scenario, seed=SEED, given=given)
+    return run_episode(prepare(config), memory(task, kitchen))
 
 
 ALONE = {"reasoner.otherwise": "none", "replanner.otherwise": "none"}
@@ -63,9 +69,11 @@ def good_script(record: EpisodeRecord) -> Script:
 
 
 @contextmanager
-def good_model(task: str, scenario: str) -> Iterator[tuple[Scripted, EpisodeRecord]]:
+def good_model(
+    task: str, scenario: str, kitchen: bool = False
+) -> Iterator[tuple[Scripted, EpisodeRecord]]:
     """A server with good answers for a scenario, and the planner's own run."""
-    record = played(task, scenario)
+    record = played(task, scenario, kitchen=kitchen)
     with serving(good_script(record)) as server:
         yield server, record
 

@@ -1,4 +1,8 @@
-"""A server that speaks the protocol of OpenAI's chat completions; a script says its answers."""
+"""A server that speaks the protocol of OpenAI's chat completions; a script says its answers.
+
+A completion is sent as it is asked for: whole or as a stream of events, in the message or as the
+call of the tool that must be called.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from typing import Any
@@ -27,6 +31,11 @@ class Reply:
     pause_s: float = 0.0
     wait_s: float = 0.0
     promised: int | None = None
+
+    def cut(self, size: int, promised: int | None = None) -> Reply:
+        """The same, its first bytes alone."""
+        left = b"".join(self.pieces)[:size]
+        return replace(self, pieces=(left,), promised=promised)
 
 
 def said(content: Any, *, refusal: str | None = None, ended: str = "stop", **usage: Any) -> Reply:
@@ -75,8 +84,63 @@ class Scripted:
 
 def purpose_of(body: dict[str, Any]) -> str:
     """What a request is for: the name of its schema."""
+    if "tools" in body:
+        tool: str = body["tools"][0]["function"]["name"]
+        return tool
     name: str = body["response_format"]["json_schema"]["name"]
     return name
+
+
+def fitted(reply: Reply, body: dict[str, Any]) -> Reply:
+    """A completion in the form that a request asks for; any other reply as it is."""
+    if reply.status != 200 or len(reply.pieces) != 1 or reply.promised is not None:
+        return reply
+    try:
+        told = json.loads(reply.pieces[0])
+        message = told["choices"][0]["message"]
+    except (ValueError, LookupError, TypeError, RecursionError):
+        return reply
+    if "tools" in body and message["content"] is not None:
+        function = {"name": purpose_of(body), "arguments": message["content"]}
+        calls = [{"id": "call-1", "type": "function", "function": function}]
+        message |= {"content": None, "tool_calls": calls}
+    if body.get("stream"):
+        return replace(reply, pieces=tuple(_events(told)))
+    return replace(reply, pieces=(json.dumps(told).encode(),))
+
+
+def _pieces(text: str) -> list[str]:
+    """A text as it comes, a few characters an event."""
+    size = max(7, len(text) // 400)
+    return [text[k : k + size] for k in range(0, len(text), size)]
+
+
+def _events(told: dict[str, Any]) -> Iterator[bytes]:
+    """A completion as a stream of events: the role, the text in pieces, how it ended, the usage."""
+    choice = told["choices"][0]
+    message = choice["message"]
+    deltas: list[dict[str, Any]] = [{"role": "assistant", "content": ""}]
+    deltas += [{"content": piece} for piece in _pieces(message["content"] or "")]
+    if message.get("refusal"):
+        deltas.append({"refusal": message["refusal"]})
+    for call in message.get("tool_calls", ()):
+        name, said = call["function"]["name"], call["function"]["arguments"]
+        deltas.append({"tool_calls": [{"index": 0, "function": {"name": name, "arguments": ""}}]})
+        deltas += [
+            {"tool_calls": [{"index": 0, "function": {"arguments": piece}}]}
+            for piece in _pieces(said)
+        ]
+    head = {k: told[k] for k in ("id", "created", "model")} | {"object": "chat.completion.chunk"}
+    for delta in deltas:
+        yield _event({**head, "choices": [{"index": 0, "delta": delta, "finish_reason": None}]})
+    ended = {"index": 0, "delta": {}, "finish_reason": choice["finish_reason"]}
+    yield _event({**head, "choices": [ended]})
+    yield _event({**head, "choices": [], "usage": told["usage"]})
+    yield b"data: [DONE]\n\n"
+
+
+def _event(data: Any) -> bytes:
+    return f"data: {json.dumps(data)}\n\n".encode()
 
 
 def in_turn(*replies: Reply) -> Script:
@@ -101,7 +165,7 @@ def serving(script: Script) -> Iterator[Scripted]:
                 return
             scripted.asked.append(body)
             scripted.keys.append(self.headers.get("Authorization", ""))
-            self.answer(scripted.script(body))
+            self.answer(fitted(scripted.script(body), body), stream=bool(body.get("stream")))
 
         def do_GET(self) -> None:
             if self.path != "/v1/models":
@@ -109,11 +173,12 @@ def serving(script: Script) -> Iterator[Scripted]:
                 return
             self.answer(scripted.models)
 
-        def answer(self, reply: Reply) -> None:
+        def answer(self, reply: Reply, stream: bool = False) -> None:
             time.sleep(reply.wait_s)
             length = sum(map(len, reply.pieces)) if reply.promised is None else reply.promised
             self.send_response(reply.status)
-            self.send_header("Content-Type", "application/json")
+            kind = "text/event-stream" if stream and reply.status == 200 else "application/json"
+            self.send_header("Content-Type", kind)
             self.send_header("Content-Length", str(length))
             for name, value in reply.headers:
                 self.send_header(name, value)

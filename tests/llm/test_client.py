@@ -1,15 +1,18 @@
 """The client over real HTTP: whatever the endpoint does, an answer or a sentence, and in time."""
 
+import dataclasses
 import json
 import time
+from typing import Any
 
 import pytest
 
 from forestall.deadline import Deadline
 from forestall.errors import InputError
+from forestall.llm.bodies import Form
 from forestall.llm.client import ClientConfig, OpenAIModel
 from forestall.types.exchange import Exchange, Request
-from llm.server import Reply, Script, failed, having, in_turn, said, serving
+from llm.server import Reply, Script, failed, fitted, having, in_turn, said, serving
 
 REQUEST = Request(
     "reasoning", (("system", "be short"), ("user", "why?")), json.dumps({"type": "object"})
@@ -23,7 +26,7 @@ def key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_PROXY", "*")
 
 
-def asked(script: Script, **options: object) -> tuple[Exchange, list[dict[str, object]]]:
+def asked(script: Script, **options: object) -> tuple[Exchange, list[dict[str, Any]]]:
     with serving(script) as server:
         config = ClientConfig(model="m", base_url=server.url, **options)  # type: ignore[arg-type]
         return OpenAIModel(config).ask(REQUEST), server.asked
@@ -64,9 +67,89 @@ def test_pictures_go_with_the_first_message_of_the_user() -> None:
 
 
 def test_an_endpoint_without_schemas_is_told_in_words() -> None:
-    _, bodies = asked(in_turn(said("{}")), schema=False, temperature=None)
+    _, bodies = asked(in_turn(said("{}")), form=Form.TEXT, temperature=None)
     assert "response_format" not in bodies[0] and "temperature" not in bodies[0]
-    assert '{"type": "object"}' in bodies[0]["messages"][0]["content"]  # type: ignore[index]
+    assert '{"type": "object"}' in bodies[0]["messages"][0]["content"]
+
+
+LONG = {"cause": "a bowl — ü", "why": "x" * 300}
+BODY = {"stream": True, "response_format": {"json_schema": {"name": "reasoning"}}}
+
+
+@pytest.mark.parametrize("form", Form)
+@pytest.mark.parametrize("stream", [False, True])
+def test_an_answer_is_the_same_in_every_form_whole_or_streamed(form: Form, stream: bool) -> None:
+    found, (body,) = asked(in_turn(said(LONG)), form=form, stream=stream)
+    assert (found.answer, found.problem) == (json.dumps(LONG), "")
+    assert (found.prompt_tokens, found.answer_tokens) == (300, 50)
+    assert ("stream" in body, "stream_options" in body) == (stream, stream)
+    assert ("tools" in body) == (form is Form.FUNCTION)
+    if form is Form.FUNCTION:
+        (tool,) = body["tools"]
+        assert tool["function"]["name"] == "reasoning"
+        assert tool["function"]["parameters"] == {"type": "object"}
+        assert body["tool_choice"] == {"type": "function", "function": {"name": "reasoning"}}
+
+
+def test_a_tool_that_nobody_named_is_not_taken_for_an_answer() -> None:
+    call = {"function": {"name": "os.system", "arguments": "{}"}}
+    message = {"message": {"content": None, "tool_calls": [call]}}
+    body = json.dumps({"choices": [message]}).encode()
+    found, _ = asked(lambda b: Reply(pieces=(body, b"")), form=Form.FUNCTION, retries=0)
+    assert found.answer is None and "calls 'os.system', which it was not asked to" in found.problem
+
+
+STREAM = fitted(said(LONG), BODY)
+WHOLE = b"".join(STREAM.pieces)
+
+
+@pytest.mark.parametrize("size", [0, 3, 250, 700, len(WHOLE) // 2, len(WHOLE) - 400])
+@pytest.mark.parametrize("how", ["ended early", "broken off"])
+def test_of_a_stream_that_is_cut_what_came_is_kept_and_is_no_answer(size: int, how: str) -> None:
+    promised = None if how == "ended early" else len(WHOLE)
+    found, _ = asked(in_turn(STREAM.cut(size, promised)), stream=True, retries=0)
+    assert found.problem and not (found.problem == "" and found.answer)
+    assert json.dumps(LONG).startswith(found.answer or "")
+    assert bool(found.answer) == (size > 500), (found.answer, found.problem)
+
+
+def test_a_stream_that_has_ended_is_not_waited_for() -> None:
+    started = time.monotonic()
+    open_end = dataclasses.replace(STREAM, pieces=(WHOLE, b""), pause_s=15.0)
+    found, _ = asked(in_turn(open_end), stream=True, timeout_s=60)
+    assert found.answer == json.dumps(LONG) and found.seconds < 14
+    assert time.monotonic() - started < 60
+
+
+def test_a_stream_that_is_slow_costs_its_time_limit_and_keeps_what_came() -> None:
+    started = time.monotonic()
+    slow = dataclasses.replace(STREAM, pause_s=0.3)
+    found, _ = asked(in_turn(slow), stream=True, timeout_s=5)
+    assert found.problem and found.seconds < 10 and time.monotonic() - started < 40
+    assert found.answer and json.dumps(LONG).startswith(found.answer)
+    assert "in time" in found.problem or "within 5 s" in found.problem
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b'data: {"error": {"message": "out of memory"}}\n\n', "out of memory"),
+        (b'data: {"choices": [{"delta": null}]}\n\n', "cannot be read"),
+        (b'data: {"choices": [{"delta": {"content": ["x"]}}]}\n\ndata: [DONE]\n\n', "empty"),
+        (b"data: {\n\n", "cannot be read"),
+        (b"data: \xff\n\n", "cannot be read"),
+        (b": keep-alive\n\n" * 3, "ended before"),
+        (b"data: [DONE]\n\n", "empty"),
+        (b"x" * (4 * 2**20 + 1), "larger than"),
+        (b"".join(fitted(said(None, refusal="I cannot"), BODY).pieces), "refuses: I cannot"),
+        (b"".join(fitted(said("{}", ended="length"), BODY).pieces), "cut off"),
+    ],
+    ids=["error", "null", "no text", "json", "utf-8", "nothing", "done", "large", "refusal",
+         "length"],
+)  # fmt: skip
+def test_a_stream_that_says_nothing_is_a_sentence(data: bytes, words: str) -> None:
+    found, _ = asked(in_turn(Reply(pieces=(data, b""))), stream=True, retries=0)
+    assert words in found.problem
 
 
 @pytest.mark.parametrize("status", [408, 409, 429, 500, 503])

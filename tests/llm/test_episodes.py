@@ -1,5 +1,6 @@
 """Whole runs by the model path, over real HTTP."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,21 @@ def test_the_model_path_alone_solves_what_the_planner_solves(name: str) -> None:
         str(e.subtask) for e in by_planner.executed
     ]
     assert all(not e.problem for e in asked(record))
+
+
+@pytest.mark.simulator
+@pytest.mark.skipif(not os.environ.get("FORESTALL_TEST_LLM_KITCHEN"), reason="takes minutes")
+@pytest.mark.parametrize("name", ("microwave-occupied", "robofail-make-coffee-1"))
+def test_in_the_kitchen_the_model_path_alone_does_what_the_planner_does(name: str) -> None:
+    task = load_scenario(name).task
+    with good_model(task, name, kitchen=True) as (server, by_planner):
+        record = played(task, name, server.url, kitchen=True, **ALONE)
+    assert record.success == by_planner.success
+    replans = [b.replan for b in record.boundaries if b.replan is not None]
+    assert replans and all(r.producer == "model" for r in replans if r.plan is not None)
+    assert [str(e.subtask) for e in record.executed] == [
+        str(e.subtask) for e in by_planner.executed
+    ]
 
 
 TASK, OCCUPIED = "heat-potato", "microwave-occupied"

@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from forestall.diagnosis.model import ModelReasoner
 from forestall.diagnosis.none import NoReasoning
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal
-from forestall.types.verdict import Calibration, Decision, Diagnosis, Verdict
+from forestall.types.observation import Rgb
+from forestall.types.verdict import Calibration, Decision, Diagnosis, Reference, Verdict
 from llm.scenes import EXPLAINED, Scripted, alarm, occupied
 from planning.corpus import DOMAIN
 
@@ -114,6 +116,24 @@ def test_the_robots_picture_goes_with_the_question_where_it_is_wanted() -> None:
     (jpeg,) = reasoner.request(seen, alarm(nearest=None)).images
     assert jpeg.startswith(b"\xff\xd8")
     assert not reasoner.request(replace(seen, observation=None), alarm(nearest=None)).images
+
+
+def test_the_picture_of_the_demonstration_goes_with_it_where_the_memory_keeps_it() -> None:
+    grey = np.full((4, 6, 3), 128, np.uint8)
+    of: list[str] = []
+
+    def shown(reference: Reference) -> Rgb | None:
+        of.append(reference.demonstration)
+        return grey if len(of) == 1 else None
+
+    reasoner = ModelReasoner(Scripted([""]), DOMAIN, pictures=True, shown=shown)
+    both = reasoner.request(occupied(), alarm())
+    assert len(both.images) == 2 and of == ["demo-1"]
+    assert "Picture 1: what is seen. Picture 2: a run that went well." in both.messages[1][1]
+    alone = reasoner.request(occupied(), alarm())
+    assert len(alone.images) == 1 and "Picture 2" not in alone.messages[1][1]
+    unseen = replace(occupied(), observation=None)
+    assert "Picture" not in reasoner.request(unseen, alarm()).messages[1][1]
 
 
 def test_a_fence_around_an_answer_is_no_fault() -> None:

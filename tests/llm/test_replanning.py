@@ -46,6 +46,7 @@ def test_what_is_asked_names_state_skills_places_and_diagnosis() -> None:
     _, (_, text) = model.asked[0].messages
     for words in (
         "Make true: vacant(Microwave-1)", "Keep true: on_top_of(Potato, Plate-1)",
+        "Never: spoiled(potato)\n",
         'Advice: "take the bowl out"', "holds Plate-1", "inside Microwave-1",
         "pick_up(object) needs no h: held_by(h, gripper)", "room for Bowl-1, Plate-1: ",
         "Old plan: put_in(Plate, Microwave); close_obj(Microwave); toggle_on(Microwave)",

@@ -66,6 +66,11 @@ def model(
     )
 
 
+def beside(memory: Path) -> Path:
+    """The file of expectations that belongs to a memory, where nobody names another."""
+    return memory.with_name(f"{memory.name}.expected.toml")
+
+
 def read_expected(path: Path, domain: Domain) -> tuple[Expected, ...]:
     """A file of expectations.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from enum import Enum
 from functools import partial
 from inspect import signature
 from pathlib import Path
@@ -27,6 +28,7 @@ from forestall.detection.image import ImageDetector
 from forestall.detection.objects import ObjectCountDetector
 from forestall.detection.preconditions import PreconditionConfig, PreconditionDetector
 from forestall.detection.scene_graph import DetectorConfig, SceneGraphDetector
+from forestall.diagnosis.locating import ModelLocator
 from forestall.diagnosis.none import NoReasoning
 from forestall.diagnosis.symbolic import SymbolicReasoner
 from forestall.errors import InputError, UnknownNameError
@@ -35,6 +37,7 @@ from forestall.kinds import (
     DETECTOR,
     EXPECTATIONS,
     IMAGE_ENCODER,
+    LLM,
     PERCEIVER,
     REASONER,
     REPLANNER,
@@ -51,7 +54,7 @@ from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.anew import GoalReplanner
 from forestall.replanning.symbolic import PlannerReplanner
-from forestall.seams import Parts, PlanValidator
+from forestall.seams import Locator, Parts, PlanValidator
 from forestall.strategies.judges import DetectorJudge
 from forestall.strategies.online import Online, OnlineScene
 from forestall.strategies.panel import Agree, Panel
@@ -280,14 +283,43 @@ def _panel(parts: Parts, judges: tuple[str, ...], agree: Agree) -> Panel:
     return Panel(heard, PlanChecking.name in names, agree)
 
 
-def post_hoc(parts: Parts, *, max_attempts: int = _POST_HOC) -> PostHoc:
-    """After the whole task (REFLECT)."""
-    return _stepping_in(PostHoc, parts, max_attempts)
+class Locate(Enum):
+    """Who says at which step a run went wrong."""
+
+    SCENES = "scenes"
+    MODEL = "model"
 
 
-def online(parts: Parts, *, max_attempts: int = _ONLINE) -> Online:
-    """After each subtask, by its own outcome (REFLECT, online)."""
-    return _stepping_in(Online, parts, max_attempts, _scoping(parts))
+def post_hoc(
+    parts: Parts, *, max_attempts: int = _POST_HOC, locate: Locate = Locate.SCENES
+) -> PostHoc:
+    """After the whole task (REFLECT).
+
+    Args:
+        parts: what it is made of.
+        max_attempts: corrections of one run.
+        locate: who names the step that went wrong: the scenes that did not fit, or a language model
+            by REFLECT's questions about the whole run.
+    """
+    strategy = partial(PostHoc, locator=_locator(parts, locate), scope=_scoping(parts))
+    return _stepping_in(strategy, parts, max_attempts)
+
+
+def online(parts: Parts, *, max_attempts: int = _ONLINE, locate: Locate = Locate.SCENES) -> Online:
+    """After each subtask, by its own outcome (REFLECT, online).
+
+    Args:
+        parts: what it is made of.
+        max_attempts: repairs of one cause.
+        locate: who says whether a subtask did what it is for: the scene after it, or a language
+            model by REFLECT's questions.
+    """
+    strategy = partial(Online, locator=_locator(parts, locate))
+    return _stepping_in(strategy, parts, max_attempts, _scoping(parts))
+
+
+def _locator(parts: Parts, locate: Locate) -> Locator | None:
+    return None if locate is Locate.SCENES else ModelLocator(parts.part(LLM), parts.domain)
 
 
 def online_scene(parts: Parts, *, max_attempts: int = _ONLINE) -> OnlineScene:

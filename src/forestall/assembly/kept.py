@@ -20,10 +20,11 @@ from forestall.assembly.parts import Assembly
 from forestall.domain.model import Domain
 from forestall.errors import InputError, MemoryFileError
 from forestall.kinds import DOMAIN, PERCEIVER
+from forestall.memory.store import open_store
 from forestall.perception.folder import read_observation, write_observation
 from forestall.seams import Perceiver
-from forestall.types.demonstration import Demonstration
-from forestall.types.observation import Observation
+from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.observation import Observation, Rgb
 
 _HASH = re.compile(r"^[0-9a-f]{32}$")
 
@@ -150,3 +151,18 @@ def _digest(folder: Path) -> str:
         hasher.update(f"{file.name} {len(content)} ".encode())
         hasher.update(content)
     return hasher.hexdigest()
+
+
+def picture_of(memory: Path, step: DemonstrationStep, domain: Domain) -> Rgb | None:
+    """What was seen at a step of a demonstration, None where it was not kept.
+
+    Raises:
+        MemoryFileError: it was, and is damaged.
+    """
+    if step.image is not None:
+        with open_store(memory) as store:
+            return store.get_image(step.image)
+    if step.observation is None:
+        return None
+    frames = KeptObservations(memory).get(step.observation, domain).frames
+    return frames[-1].rgb if frames else None

@@ -6,17 +6,20 @@ replanner of a model have the plain ones behind them, which answer where the mod
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from forestall.assembly.configuration import Given
 from forestall.assembly.registry import known
 from forestall.diagnosis.model import ModelReasoner
 from forestall.errors import InputError
-from forestall.kinds import LLM, REASONER, REPLANNER, VALIDATOR
+from forestall.kinds import LLM, REASONER, REPLANNER, STORE, VALIDATOR
 from forestall.llm.client import ClientConfig, OpenAIModel
 from forestall.llm.recording import RecordingModel, ReplayingModel
 from forestall.replanning.model import ModelReplanner
 from forestall.seams import LanguageModel, Parts
+from forestall.types.observation import Rgb
+from forestall.types.verdict import Reference
 
 _NO_MODEL = "none"
 
@@ -65,13 +68,39 @@ def model_reasoner(
     Args:
         parts: llm, domain.
         attempts: answers that are asked for.
-        pictures: whether the robot's picture goes with the question.
+        pictures: whether the robot's picture goes with the question, and beside it that of the
+            nearest demonstration, where a memory that was named keeps pictures.
         otherwise: the reasoner that explains where the model does not; "none": nobody does.
     """
     _at_least_one(attempts)
     behind = None if otherwise == _NO_MODEL else parts.part(REASONER, otherwise)
     model = parts.part(LLM)
-    return ModelReasoner(model, parts.domain, behind, attempts=attempts, pictures=pictures)
+    shown = _pictures(parts) if pictures else None
+    return ModelReasoner(
+        model, parts.domain, behind, attempts=attempts, pictures=pictures, shown=shown
+    )
+
+
+def _pictures(parts: Parts) -> Callable[[Reference], Rgb | None] | None:
+    """The pictures of the run's memory; None where it is the ready-made one, which keeps none."""
+    from forestall.assembly.kept import picture_of
+
+    path = parts.options(STORE).get("path")
+    if path is None:
+        return None
+
+    def shown(reference: Reference) -> Rgb | None:
+        steps = (
+            s
+            for d in parts.demonstrations
+            if d.id == reference.demonstration
+            for s in d.steps
+            if s.index == reference.index
+        )
+        step = next(steps, None)
+        return None if step is None else picture_of(Path(path), step, parts.domain)
+
+    return shown
 
 
 def model_replanner(

@@ -15,6 +15,7 @@ from forestall.assembly.eyes import eyes_for
 from forestall.assembly.own_domain import domain_of_demonstrations, fits
 from forestall.assembly.sources import scoped
 from forestall.comparison.corrections import Correction, Corrections, stale
+from forestall.comparison.expectations import WEIGHT, Expected
 from forestall.comparison.lifting import evaluate
 from forestall.comparison.preconditions import mine
 from forestall.domain.formula import show
@@ -29,6 +30,7 @@ from forestall.types.plan import Subtask
 from forestall.types.verdict import Precondition, Reference
 
 MINED, ADDED, DROPPED = "mined", "added by hand", "left out by hand"
+EXPECTED = "expected by a language model"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,8 @@ class Row:
         held: uses before which it held.
         uses: that are counted.
         weight: the largest that it has for a group.
-        origin: mined, added or left out by hand.
+        origin: mined, added or left out by hand, or expected by a language model: then no
+            demonstration is counted.
         kinds: the subtasks for which it is mined; () where for all of the skill that were shown.
         tasks: likewise.
         note: of the correction.
@@ -200,6 +203,29 @@ def rows(known: Remembered, task: str | None = None, skill: str | None = None) -
         (_row(key, cases, kinds[key[0]], known) for key, cases in by_fact.items()),
         key=lambda r: (r.skill, r.origin == DROPPED, -r.weight, -r.held, r.fact),
     )
+
+
+def expected_rows(
+    known: Remembered,
+    said: Iterable[Expected],
+    task: str | None = None,
+    skill: str | None = None,
+) -> list[Row]:
+    """What a language model expects, a row for each fact; it is no part of what is mined.
+
+    Where a demonstration shows such a subtask the model has no say, and the note says so.
+    """
+    demonstrated = {_kind(u.subtask, known.domain) for u in _uses(known.demonstrations)}
+    found = []
+    for e in said:
+        if skill not in (None, e.skill) or task not in (None, e.task):
+            continue
+        subtask = Subtask(e.skill, e.args)
+        silent = "no say, since a demonstration shows it; " if subtask in demonstrated else ""
+        note = f"{silent}{e.model}" + (f": {e.why}" if e.why else "")
+        only = (str(subtask),), (e.task,)
+        found += [Row(e.skill, f, 0, 0, 0, 0, WEIGHT, EXPECTED, *only, note) for f in e.facts]
+    return found
 
 
 def shown(known: Remembered, subtask: Subtask, task: str | None = None) -> list[Shown]:

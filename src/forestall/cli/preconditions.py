@@ -31,9 +31,10 @@ def list_(
     task: str | None = None,
     skill: str | None = None,
     domain: str | None = None,
+    expectations: Path | None = None,
     as_json: Json = False,
 ) -> int:
-    """List what always held before each skill, and what a person says must hold.
+    """List what always held before each skill, and what a person or a model says must hold.
 
     Args:
         memory: a demonstration file.
@@ -41,13 +42,22 @@ def list_(
         skill: only what is mined before this skill.
         domain: what the memory is read in, by name or file; by default one that comes with the
             project and has its skills, else one that is learnt from it.
+        expectations: a file of what a language model expects (--expectations.file of a run);
+            MEMORY.expected.toml by default, where it is there.
         as_json: print JSON.
     """
-    from forestall.assembly.mined import remembered, rows
+    from forestall.assembly.expecting import beside, read_expected
+    from forestall.assembly.mined import expected_rows, remembered, rows
     from forestall.cli.listing import print_table
 
     known = remembered(memory, given_domain(domain))
-    found = rows(known, task, skill)
+    file = expectations or beside(memory)
+    said = read_expected(file, known.domain) if expectations or file.exists() else ()
+    expected = expected_rows(known, said, task, skill)
+    strange = expected and (
+        (skill and skill not in known.skills) or (task and task not in known.tasks)
+    )
+    found = [*([] if strange else rows(known, task, skill)), *expected]
     tell_stale(known)
     if as_json:
         print(json.dumps({"domain": known.domain.name, "rows": _plain(found)}, indent=2))

@@ -9,13 +9,13 @@ does not become what is expected. Nothing is asked twice.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 
 from forestall.comparison.expectations import Expected, Key, beside, key_of
 from forestall.domain.model import Domain
 from forestall.llm import words
-from forestall.llm.answers import Said, Unfit, because, expectations, expectations_schema
-from forestall.llm.prompts import fragment, rendered
+from forestall.llm.answers import Said, because, expectations, expectations_schema
+from forestall.llm.asking import answered
+from forestall.llm.prompts import rendered
 from forestall.seams import LanguageModel
 from forestall.supervision import deadline
 from forestall.types.exchange import Exchange, Request
@@ -114,24 +114,15 @@ class ModelExpectations:
 
     def _answer(self, context: BoundaryContext, steps: Mapping[int, Subtask]) -> Said:
         """What the model says, {} where it gives no answer that can be read."""
-        request, until = self.request(context, steps), deadline()
-        for _ in range(self._attempts):
-            asked = self._model.ask(request, until)
-            if asked.problem or asked.answer is None:
-                self._exchanges.append(asked)
-                break
-            try:
-                said, dropped = expectations(asked.answer, steps, self._domain)
-            except Unfit as error:
-                self._exchanges.append(replace(asked, problem=str(error)))
-                again = fragment("correction", reason=str(error))
-                more = (("assistant", asked.answer), ("user", again))
-                request = replace(request, messages=(*request.messages, *more))
-                continue
-            left = f"{len(dropped)} of its facts {because(dropped)}" if dropped else ""
-            self._exchanges.append(replace(asked, note=left))
-            return said
-        return {}
+
+        def read(answer: str) -> tuple[Said, str]:
+            said, dropped = expectations(answer, steps, self._domain)
+            return said, f"{len(dropped)} of its facts {because(dropped)}" if dropped else ""
+
+        request = self.request(context, steps)
+        said, asked = answered(self._model, request, read, self._attempts, deadline())
+        self._exchanges += asked
+        return said or {}
 
     def request(self, context: BoundaryContext, steps: Mapping[int, Subtask]) -> Request:
         """What is asked about some steps of the plan at hand, by their numbers."""

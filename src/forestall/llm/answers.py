@@ -1,7 +1,8 @@
 """Schemas of answers, and answers read into types: whatever does not fit is a reason in words.
 
 Called by whoever asks a language model. An answer is checked against the domain and the scene, and
-nothing of it is ever called by its name.
+nothing of it is ever called by its name. The fields of a schema stand in the order in which they
+are to be thought of, since endpoints have them written in that order.
 """
 
 from __future__ import annotations
@@ -51,11 +52,16 @@ def _text(description: str) -> dict[str, Any]:
     return {"type": "string", "description": description}
 
 
-def diagnosis_schema(things: Collection[str]) -> str:
-    """The schema of an explanation; what it is because of is one of the things at hand."""
+def diagnosis_schema(things: Collection[str], steps: Collection[int] = ()) -> str:
+    """The schema of an explanation; what it is because of is one of the things at hand.
+
+    With some steps it also names the one that it is about.
+    """
     among = {"type": "string", "enum": sorted(things)} if things else {"type": "string"}
+    step = {"step": {"type": "integer", "enum": sorted(steps)}} if steps else {}
     return json.dumps(
         _object(
+            **step,
             cause=_text("what is wrong, one sentence"),
             why=_text("how that makes the step fail, one sentence"),
             because_of=_list(among),
@@ -63,8 +69,21 @@ def diagnosis_schema(things: Collection[str]) -> str:
             must_stay=_list(_text("a fact that must stay true")),
             advice=_text("what to do, one sentence"),
         ),
-        sort_keys=True,
     )
+
+
+def verified_schema() -> str:
+    """The schema of whether a step did what it is for."""
+    return json.dumps(_object(why=_text("one sentence"), done={"type": "boolean"}))
+
+
+def verified(answer: str) -> tuple[bool, str]:
+    """Whether a step did what it is for, and why.
+
+    Raises:
+        Unfit: the answer cannot be read.
+    """
+    return _read(answer, lambda field: (field["done"].flag(), line(field["why"].text())))
 
 
 def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
@@ -73,7 +92,7 @@ def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
         skill={"type": "string", "enum": sorted(skills)},
         args=_list({"type": "string", "enum": sorted(things)}),
     )
-    return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)), sort_keys=True)
+    return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)))
 
 
 def expectations_schema(numbers: Collection[int]) -> str:
@@ -83,12 +102,12 @@ def expectations_schema(numbers: Collection[int]) -> str:
         must_hold=_list(_text("a fact")),
         why=_text("one sentence"),
     )
-    return json.dumps(_object(steps=_list(step)), sort_keys=True)
+    return json.dumps(_object(steps=_list(step)))
 
 
 def explanation_schema() -> str:
     """The schema of one sentence for people."""
-    return json.dumps(_object(explanation=_text("one sentence")), sort_keys=True)
+    return json.dumps(_object(explanation=_text("one sentence")))
 
 
 def sentence_of(answer: str) -> str:
@@ -142,6 +161,24 @@ def explanation(answer: str, graph: SceneGraph, domain: Domain) -> Explained:
         Unfit: it is none, or says nothing.
     """
     return _read(answer, lambda field: _explained(field, graph, domain))
+
+
+def located(
+    answer: str, numbers: Collection[int], graph: SceneGraph, domain: Domain
+) -> tuple[int, Explained]:
+    """Read an explanation that names the step of a run that it is about, by its number.
+
+    Raises:
+        Unfit: it is none, says nothing, or there is no such step.
+    """
+
+    def read(field: Field) -> tuple[int, Explained]:
+        number = field["step"].whole()
+        if number not in numbers:
+            raise Unfit(f"there is no step {number}: the run has {len(numbers)}")
+        return number, _explained(field, graph, domain)
+
+    return _read(answer, read)
 
 
 def _explained(field: Field, graph: SceneGraph, domain: Domain) -> Explained:

@@ -7,23 +7,30 @@ environment, and no message of ours repeats it.
 
 from __future__ import annotations
 
-import base64
-import json
 import os
 import threading
 import time
 import weakref
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from email.utils import parsedate_to_datetime
 from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
 
 from forestall.deadline import Deadline
-from forestall.errors import ForestallError, InputError
-from forestall.reading.documents import parse_json
-from forestall.reading.fields import Field
+from forestall.errors import InputError
+from forestall.llm.bodies import (
+    LONGEST,
+    STREAM_END,
+    Body,
+    Form,
+    answer_of,
+    models_of,
+    request_body,
+    streamed,
+    tool_name,
+)
 from forestall.types.exchange import Exchange, Request
 
 OPENAI_MODEL = "gpt-4o"
@@ -32,10 +39,11 @@ OPENAI_MODEL = "gpt-4o"
 MOST_BYTES = 256 * 1024
 """How large the body of an answer may be; ours are a few kilobytes."""
 
+MOST_STREAMED_BYTES = 16 * MOST_BYTES
+"""The same of a stream, in which each token comes in an event of its own."""
+
 _AGAIN = (408, 409, 429)
 _FIRST_WAIT_S, _MOST_WAIT_S, _POLL_S = 0.5, 8.0, 0.05
-_LONGEST = 300
-"""Characters of somebody else's message."""
 _TOLD = 12
 """How many models a message names."""
 
@@ -51,7 +59,10 @@ class ClientConfig:
         timeout_s: of one question, every further try and every pause between them included.
         retries: further tries after an answer that says "later", or none at all.
         temperature: of the model; None where the endpoint takes none.
-        schema: whether the endpoint is given the answer's JSON schema; else it stands in the text.
+        form: how the endpoint is told what an answer looks like: a JSON schema, a function to call,
+            or the text alone.
+        stream: whether the answer comes piece by piece; of one that does not end in time, what came
+            is kept.
         max_calls: tries of one run.
         max_tokens: of one run, as the endpoint counts them, prompts and answers.
         dollars_in: price of a million tokens of prompt; None: not known.
@@ -67,7 +78,8 @@ class ClientConfig:
     timeout_s: float = 20.0
     retries: int = 3
     temperature: float | None = 0.0
-    schema: bool = True
+    form: Form = Form.SCHEMA
+    stream: bool = False
     max_calls: int = 60
     max_tokens: int = 200_000
     dollars_in: float | None = None
@@ -103,7 +115,7 @@ def _check_address(text: str) -> None:
 class _Got:
     """What one try came to: a body, or a problem and whether another try may help."""
 
-    body: bytes = b""
+    body: bytes = b""  # with a problem: what came before it, of a stream
     problem: str = ""
     again: bool = False
     wait_s: float | None = None
@@ -152,7 +164,7 @@ class OpenAIModel:
             return OPENAI_MODEL
         list_models = client.models.with_streaming_response.list
         got = self._once(list_models, Deadline(self._config.timeout_s))
-        names, problem = ((), got.problem) if got.problem else _models(got.body)
+        names, problem = ((), got.problem) if got.problem else models_of(got.body)
         if len(names) == 1:
             return names[0]
         if not problem:
@@ -176,13 +188,16 @@ class OpenAIModel:
                 got = _Got(problem=got.problem if tries else "there was no time left to ask")
                 break
             tries += 1
-            got = self._once(partial(self._create, **self._body(request)), limit)
+            c = self._config
+            body = request_body(request, self.name, c.form, c.temperature, c.stream)
+            got = self._once(partial(self._create, **body), limit)
             if not got.again or tries > self._config.retries:
                 break
             wait_s = pause_s if got.wait_s is None else got.wait_s
             if wait_s >= limit.left():
                 waiting = f"; it asks to wait {wait_s:g} s" if got.wait_s is not None else ""
-                got = _Got(problem=f"{got.problem}{waiting}, and the time is over before")
+                why = f"{got.problem}{waiting}, and the time is over before"
+                got = replace(got, problem=why)
                 break
             _sleep(wait_s, limit)
             pause_s = min(2 * pause_s, _MOST_WAIT_S)
@@ -203,8 +218,9 @@ class OpenAIModel:
     def _once(self, call: Callable[..., Any], limit: Deadline) -> _Got:
         """One try, on a thread of its own: neither a name server nor a trickle takes longer."""
         box: list[_Got] = []
+        came = bytearray()
         thread = threading.Thread(
-            target=lambda: box.append(self._sent(call, limit)), name="language model",
+            target=lambda: box.append(self._sent(call, limit, came)), name="language model",
             daemon=True,
         )  # fmt: skip
         thread.start()
@@ -212,20 +228,23 @@ class OpenAIModel:
             thread.join(min(_POLL_S, max(limit.left(), 0.001)))
         if box:
             return box[0]
-        return _Got(problem=f"no answer within {self._config.timeout_s:g} s", again=True)
+        what = "no whole answer" if came else "no answer"
+        return _Got(bytes(came), f"{what} within {self._config.timeout_s:g} s", again=True)
 
-    def _sent(self, call: Callable[..., Any], limit: Deadline) -> _Got:
+    def _sent(self, call: Callable[..., Any], limit: Deadline, body: bytearray) -> _Got:
         sdk = self._sdk
+        most = MOST_STREAMED_BYTES if self._config.stream else MOST_BYTES
         try:
             left_s = max(limit.left(), 0.001)
             with call(timeout=left_s) as response:
-                body = bytearray()
                 for piece in response.iter_bytes():
                     body += piece
-                    if len(body) > MOST_BYTES:
-                        return _Got(problem=f"the answer is larger than {MOST_BYTES} bytes")
+                    if len(body) > most:
+                        return _Got(problem=f"the answer is larger than {most} bytes")
+                    if self._config.stream and STREAM_END in body[-len(piece) - len(STREAM_END) :]:
+                        break  # whether the endpoint hangs up or not
                     if limit.over:
-                        return _Got(problem="the answer did not end in time", again=True)
+                        return _Got(bytes(body), "the answer did not end in time", again=True)
                 return _Got(bytes(body))
         except sdk.APIStatusError as error:
             again = error.status_code in _AGAIN or error.status_code >= 500
@@ -235,45 +254,22 @@ class OpenAIModel:
             cause = error.__cause__ or error
             return _Got(problem=f"the endpoint cannot be reached: {self._told(cause)}", again=True)
         except Exception as error:  # noqa: BLE001 - a library of somebody else's, on a thread
-            return _Got(problem=f"the call failed: {self._told(error)}", again=True)
-
-    def _body(self, request: Request) -> dict[str, Any]:
-        messages: list[dict[str, Any]] = [{"role": r, "content": t} for r, t in request.messages]
-        first = next((m for m in messages if m["role"] == "user"), None)
-        if request.images and first is not None:
-            first["content"] = [{"type": "text", "text": first["content"]}]
-            for image in request.images:
-                shown = {"type": "image_url", "image_url": {"url": _data_url(image)}}
-                first["content"].append(shown)
-        body: dict[str, Any] = {
-            "model": self.name, "messages": messages, "max_tokens": request.max_tokens,
-        }  # fmt: skip
-        if self._config.temperature is not None:
-            body |= dict(temperature=self._config.temperature)
-        schema = json.loads(request.schema)
-        if self._config.schema:
-            name = request.purpose.replace(" ", "_")
-            body["response_format"] = {
-                "type": "json_schema",
-                "json_schema": {"name": name, "strict": True, "schema": schema},
-            }
-        else:
-            text = f"Answer with JSON alone that fits this schema: {request.schema}"
-            messages.insert(0, {"role": "system", "content": text})
-        return body
+            return _Got(bytes(body), f"the call failed: {self._told(error)}", again=True)
 
     def _told(self, error: BaseException) -> str:
         """An error on one line, without the key."""
         text = " ".join(str(error).split())
         if self._key:
             text = text.replace(self._key, "***")
-        return f"{type(error).__name__}: {text[:_LONGEST]}"
+        return f"{type(error).__name__}: {text[:LONGEST]}"
 
     def _exchange(self, request: Request, got: _Got, tries: int, seconds: float) -> Exchange:
-        answer, problem = None, got.problem
-        sent = came = None
-        if not problem:
-            answer, problem, sent, came = _read(got.body)
+        said = Body(None, got.problem)
+        if self._config.stream and got.body:
+            said = streamed(got.body, tool_name(request), got.problem)
+        elif not got.problem:
+            said = answer_of(got.body, tool_name(request))
+        answer, sent, came = said.answer, said.prompt_tokens, said.answer_tokens
         if self._key and answer is not None:
             answer = answer.replace(self._key, "***")
         with self._lock:
@@ -284,7 +280,7 @@ class OpenAIModel:
             request.key(self.name),
             request.messages,
             answer,
-            problem,
+            said.problem,
             "",
             len(request.images),
             sent,
@@ -299,50 +295,6 @@ class OpenAIModel:
         if sent is None or came is None or c.dollars_in is None or c.dollars_out is None:
             return None
         return (sent * c.dollars_in + came * c.dollars_out) / 1e6
-
-
-def _read(body: bytes) -> tuple[str | None, str, int | None, int | None]:
-    """A body → answer, problem, tokens of prompt and answer."""
-    try:
-        field = Field(parse_json(body.decode("utf-8")))
-        usage = field.value.get("usage") if isinstance(field.value, Mapping) else None
-        sent, came = (_count(usage, n) for n in ("prompt_tokens", "completion_tokens"))
-        choice = field["choices"].items()[0]
-        message = choice["message"]
-        refusal = message.value.get("refusal")
-        content = message.value.get("content")
-        ended = choice.value.get("finish_reason")
-    except (ForestallError, ValueError, LookupError, AttributeError) as error:
-        why = " ".join(str(error).split())[:_LONGEST]
-        return None, f"the endpoint's answer cannot be read: {why}", None, None
-    if refusal:
-        return None, f"the model refuses: {str(refusal)[:_LONGEST]}", sent, came
-    if not isinstance(content, str) or not content.strip():
-        return None, "the model's answer is empty", sent, came
-    if ended == "length":
-        return content, "the answer was cut off at its greatest length", sent, came
-    if ended == "content_filter":
-        return content, "the endpoint's filter stopped the answer", sent, came
-    return content, "", sent, came
-
-
-def _models(body: bytes) -> tuple[tuple[str, ...], str]:
-    """The names of an endpoint's models, and why they cannot be read."""
-    try:
-        listed = Field(parse_json(body.decode("utf-8")))["data"].items()
-        return tuple(dict.fromkeys(m["id"].text() for m in listed)), ""
-    except (ForestallError, ValueError) as error:
-        return (), f"its list of models cannot be read: {' '.join(str(error).split())[:_LONGEST]}"
-
-
-def _count(usage: Any, name: str) -> int | None:
-    value = usage.get(name) if isinstance(usage, Mapping) else None
-    good = isinstance(value, int) and not isinstance(value, bool) and value >= 0
-    return value if good else None
-
-
-def _data_url(jpeg: bytes) -> str:
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode("ascii")
 
 
 def _asked_to_wait(headers: Mapping[str, str]) -> float | None:

@@ -19,6 +19,7 @@ from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.plan import Subtask
+from forestall.types.story import Tried
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _LONGEST, _LONGEST_NAME = 400, 80
@@ -111,6 +112,23 @@ def executed(steps: Sequence[tuple[Subtask, SkillStatus]], most: int = 12) -> st
         for s, status in steps[-most:]
     ]
     return "; ".join(told) or "nothing"
+
+
+def told_steps(events: Sequence[Tried], domain: Domain) -> list[str]:
+    """A run in words, a line for each step: how it ended, and what was seen to be new after it.
+
+    REFLECT's event-based summary: a scene is told where it has changed (its key frames).
+    """
+    known: set[str] = set()
+    lines = []
+    for event in events:
+        seen = [] if event.seen is None else scene(event.seen, domain)
+        new = [line for line in seen if line not in known]
+        known |= set(new)
+        how = "" if event.status is SkillStatus.SUCCEEDED else f" {event.status.value}"
+        after = f" | {'; '.join(new)}" if new else ""
+        lines.append(f"{event.number}. {step(event.subtask)}{how}{after}")
+    return lines
 
 
 def vocabulary(graph: SceneGraph, domain: Domain) -> str:

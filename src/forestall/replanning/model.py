@@ -15,7 +15,8 @@ from forestall.deadline import Deadline
 from forestall.domain.model import Domain
 from forestall.llm import words
 from forestall.llm.answers import Unfit, plan_schema, steps
-from forestall.llm.prompts import fragment, rendered
+from forestall.llm.asking import answered
+from forestall.llm.prompts import rendered
 from forestall.planning.execute import products
 from forestall.planning.refused import is_refused, unexplained
 from forestall.planning.state import State
@@ -23,7 +24,7 @@ from forestall.planning.validate import as_checked, observed, run, unsupported
 from forestall.seams import LanguageModel, PlanValidator, Replanner
 from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
-from forestall.types.plan import Plan, Subtask, same_step
+from forestall.types.plan import Plan, same_step
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, PlanCheck, Replan, ReplanOutcome
 
@@ -81,33 +82,19 @@ class ModelReplanner:
         whole = deadline or Deadline()
         limit = whole.within(_SHARE * whole.left()) if whole.left() < float("inf") else whole
         state = observed(context.graph, self._domain)
-        request = self.request(context, diagnosis)
         skills, things = self._skills(), self._things(context)
-        for _ in range(self._attempts):
-            asked = self._model.ask(request, limit)
-            if asked.problem or asked.answer is None:
-                attempts.exchanges.append(asked)
-                break
-            try:
-                plan, check = self._accepted(
-                    Plan(
-                        steps(asked.answer, skills, things, self._domain),
-                        context.plan.goal or context.task.goal.text,
-                    ),
-                    context,
-                    diagnosis,
-                    state,
-                    attempts,
-                )
-            except Unfit as error:
-                attempts.exchanges.append(replace(asked, problem=str(error)))
-                again = fragment("correction", reason=str(error))
-                more = (("assistant", asked.answer), ("user", again))
-                request = replace(request, messages=(*request.messages, *more))
-                continue
-            attempts.exchanges.append(asked)
-            return self._ended(attempts, ReplanOutcome.SOLVED, "", plan, check)
-        return self._without(attempts, context, diagnosis, whole)
+        goal = context.plan.goal or context.task.goal.text
+
+        def read(answer: str) -> tuple[tuple[Plan, PlanCheck], str]:
+            plan = Plan(steps(answer, skills, things, self._domain), goal)
+            return self._accepted(plan, context, diagnosis, state, attempts), ""
+
+        request = self.request(context, diagnosis)
+        accepted, asked = answered(self._model, request, read, self._attempts, limit)
+        attempts.exchanges.extend(asked)
+        if accepted is None:
+            return self._without(attempts, context, diagnosis, whole)
+        return self._ended(attempts, ReplanOutcome.SOLVED, "", *accepted)
 
     def request(self, context: BoundaryContext, diagnosis: Diagnosis) -> Request:
         """What is asked at a boundary."""
@@ -121,8 +108,9 @@ class ModelReplanner:
             advice=diagnosis.advice,
             change=[words.fact(x) for x in diagnosis.must_change],
             stay=[words.fact(x) for x in _worth_telling(diagnosis, domain)],
+            never=[words.fact(_plain(x)) for x in context.task.goal.never],
             refused=[words.step(s) for s in context.refused],
-            rest="; ".join(map(words.step, context.remaining())) or "nothing",
+            rest="; ".join(map(words.step, context.remaining())) or _done(context),
             holding=", ".join(words.name(h) for _, h in state.in_hands()) or "nothing",
             at=words.name(_stands(context, domain) or "an unknown place"),
             observed=words.scene(graph, domain, near),
@@ -284,6 +272,16 @@ def _worth_telling(diagnosis: Diagnosis, domain: Domain) -> Sequence[Literal]:
     return [x for x in diagnosis.must_stay if x.predicate in moved and x.value == "true"][:3]
 
 
+def _plain(fact: Literal) -> Literal:
+    """A fact of a goal without the marks of its variables."""
+    return Literal(fact.predicate, tuple(a.removeprefix("?") for a in fact.args), fact.value)
+
+
+def _done(context: BoundaryContext) -> str:
+    """The plan where nothing of it is left."""
+    return f"done: {'; '.join(map(words.step, context.plan.subtasks)) or 'nothing'}"
+
+
 def _stands(context: BoundaryContext, domain: Domain) -> str | None:
     """Where the robot is by name: the last place that it worked at, as far as it is still there."""
     hands = set(domain.robot.hands)
@@ -292,8 +290,3 @@ def _stands(context: BoundaryContext, domain: Domain) -> str | None:
         if done.args and done.args[-1] not in held and done.skill in domain.skills:
             return done.args[-1]
     return None
-
-
-def plain_steps(subtasks: Sequence[Subtask]) -> list[dict[str, object]]:
-    """Steps in the form of an answer, for scripted models."""
-    return [{"skill": s.skill, "args": list(s.args)} for s in subtasks]

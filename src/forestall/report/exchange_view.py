@@ -65,6 +65,8 @@ def _goes_on(before: Exchange, now: Exchange) -> bool:
 
 
 def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, Mapping):
         return ", ".join(f"{k}: {_value(v)}" for k, v in value.items())
     if not isinstance(value, list | tuple):

@@ -11,12 +11,13 @@ from inspect import signature
 from typing import Any
 
 from forestall.domain.model import Domain
-from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.supervision import ask, checked_answer, deadline
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext
+from forestall.types.story import Located, Tried, Verified
 from forestall.types.task import Goal
 from forestall.types.verdict import Diagnosis, PlanCheck, Reference, Replan, Verdict
 
@@ -72,6 +73,25 @@ class AskedReasoner:
         """As the reasoner."""
         part = f"reasoner {self.name}"
         return ask(part, "diagnose", Diagnosis, self._reasoner.diagnose, context, verdict)
+
+
+class AskedLocator:
+    """Verifies and explains, each question within its time."""
+
+    def __init__(self, locator: Locator) -> None:
+        self._locator, self.name = locator, locator.name
+
+    def verify(self, context: BoundaryContext, tried: Tried) -> Verified:
+        """As the locator."""
+        part = f"locator {self.name}"
+        return ask(part, "diagnose", Verified, self._locator.verify, context, tried)
+
+    def explain(
+        self, context: BoundaryContext, story: Sequence[Tried], failed: Tried | None
+    ) -> Located:
+        """As the locator."""
+        part = f"locator {self.name}"
+        return ask(part, "diagnose", Located, self._locator.explain, context, story, failed)
 
 
 class AskedReplanner:

@@ -11,17 +11,23 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
-from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
+from forestall.seams import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.strategies.asked import AskedDetector, AskedLocator, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked, look_again
+from forestall.strategies.story import Story
 from forestall.types.episode import SkillOutcome, SkillStatus
+from forestall.types.exchange import Exchange
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
+from forestall.types.story import Located, Verified
 from forestall.types.verdict import Decision, Diagnosis, Reference, Verdict, scenes
 
 _GO_ON = StrategyAnswer(Decision.PROCEED)
+
+VERIFIED = "subgoal check"
+"""Name of the verdict that a locator gives."""
 
 
 class Online:
@@ -38,6 +44,10 @@ class Online:
     something into or onto the thing that is wrong, as slices into a bowl of wine (paper, Sec. 4).
     Steps of a repair have no demonstration; what is left of the plan is checked after them.
 
+    With a locator, as REFLECT-online has it, nothing is compared: each subtask but driving, those
+    of a repair too, is verified by what is seen after it, and one that did not do what it is for is
+    explained from the story of the run so far. Where the locator cannot say, all is as without it.
+
     Args:
         retriever: finds the references.
         detector: judges the scene after a subtask.
@@ -47,6 +57,7 @@ class Online:
         scope: the part of a graph that concerns a subtask, as the perceiver cuts it.
         max_attempts: repairs of one cause.
         inherited: whether every deviation counts that was there before the subtask.
+        locator: says whether a subtask did what it is for, and why it did not.
     """
 
     name = "online"
@@ -63,6 +74,7 @@ class Online:
         max_attempts: int = 2,
         *,
         inherited: bool = False,
+        locator: Locator | None = None,
     ) -> None:
         self._retriever = AskedRetriever(retriever)
         self._detector = AskedDetector(detector)
@@ -71,19 +83,62 @@ class Online:
         self._scope = scope
         self._inherited = inherited
         self._before: BoundaryContext | None = None
+        self._locator = None if locator is None else AskedLocator(locator)
+        self._story = Story(scope, validator.domain)
 
     def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
         """Go on; what is seen now is kept for when the subtask is over."""
         self._intervention.begin(context)
+        if context.index == 0 and context.replans == 0:
+            self._story.begin()
         self._before = context
         return _GO_ON
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
         """Did the subtask succeed? On a failure diagnose and replan."""
         clock = Clock()
+        if self._locator is not None:
+            self._story.tried(context, outcome.status)
+            self._story.saw(context.graph)
         if outcome.status is not SkillStatus.SUCCEEDED:
             return self._failed(context, outcome.status, clock)
         onward = replace(context, index=context.index + 1)
+        asked: tuple[Exchange, ...] = ()
+        if self._locator is not None and self._story.is_subgoal(self._story.told[-1]):
+            found = self._locator.verify(context, self._story.told[-1])
+            clock.lap("compare")
+            if found.satisfied is not None:
+                return self._by_locator(self._locator, found, onward, clock)
+            asked = found.exchanges
+        return _with(self._compared(context, onward, clock), asked)
+
+    def _by_locator(
+        self, locator: AskedLocator, found: Verified, onward: BoundaryContext, clock: Clock
+    ) -> StrategyAnswer:
+        """What follows from the answer to REFLECT's question about a subtask."""
+        done = bool(found.satisfied)
+        verdict = replace(checked(VERIFIED, done, found.why), exchanges=found.exchanges)
+        if done:
+            return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        told = self._located(locator, onward)
+        diagnosis = told.diagnosis or Diagnosis(
+            f"{onward.subtask} did not do what it is for: {found.why}",
+            (),
+            producer=locator.name,
+            exchanges=told.exchanges,
+        )
+        diagnosis = self._with_facts(diagnosis, onward, clock) or diagnosis
+        clock.lap("diagnose")
+        return self._intervention.alarm(onward, verdict, diagnosis, clock)
+
+    def _located(self, locator: AskedLocator, context: BoundaryContext) -> Located:
+        """Why the newest subtask went wrong, from the story until then."""
+        return locator.explain(context, tuple(self._story.told), self._story.told[-1])
+
+    def _compared(
+        self, context: BoundaryContext, onward: BoundaryContext, clock: Clock
+    ) -> StrategyAnswer:
+        """By the scenes after the subtask in the demonstrations."""
         if self._intervention.repairs(context):
             return self._intervention.check_rest(onward, clock)
         references = self._references(context)
@@ -121,15 +176,32 @@ class Online:
             references = self._references(context)
             clock.lap("retrieve")
             needs = replace(context, references=references, when=When.BEFORE)
-            diagnosis = self._reasoner.diagnose(needs, verdict)
+            told = None if self._locator is None else self._located(self._locator, context)
+            diagnosis = None if told is None else told.diagnosis
+            if diagnosis is None:
+                diagnosis = self._reasoner.diagnose(needs, verdict)
+                asked = () if told is None else told.exchanges
+                diagnosis = replace(diagnosis, exchanges=(*asked, *diagnosis.exchanges))
             clock.lap("diagnose")
-        if diagnosis is None or not diagnosis.must_change:
-            diagnosis = self._intervention.why_not(context, clock) or diagnosis
+        diagnosis = self._with_facts(diagnosis, context, clock)
         if diagnosis is None:
             diagnosis = Diagnosis(f"nothing is seen that stands against {context.subtask}", ())
         if not diagnosis.must_change and context.may_look:
             return look_again(verdict, clock, diagnosis.cause)
         return self._intervention.alarm(context, verdict, diagnosis, clock)
+
+    def _with_facts(
+        self, diagnosis: Diagnosis | None, context: BoundaryContext, clock: Clock
+    ) -> Diagnosis | None:
+        """Where a diagnosis names no fact, those that the check of the plan lacks; words stay."""
+        if diagnosis is not None and diagnosis.must_change:
+            return diagnosis
+        missing = self._intervention.why_not(context, clock)
+        if missing is None or diagnosis is None:
+            return missing or diagnosis
+        if not diagnosis.advice:
+            return replace(missing, exchanges=diagnosis.exchanges)
+        return replace(diagnosis, must_change=missing.must_change, refusal=missing.refusal)
 
     def _references(self, context: BoundaryContext) -> tuple[Reference, ...]:
         return scenes(self._retriever.retrieve(context.subtask, context.task.name, context.done))
@@ -171,6 +243,14 @@ class OnlineScene(Online):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **{"inherited": True, **kwargs})
+
+
+def _with(answer: StrategyAnswer, asked: tuple[Exchange, ...]) -> StrategyAnswer:
+    """An answer with what was asked in vain before it."""
+    if not asked or answer.verdict is None:
+        return answer
+    verdict = replace(answer.verdict, exchanges=(*asked, *answer.verdict.exchanges))
+    return replace(answer, verdict=verdict)
 
 
 def _of_the_receiver(literal: Literal, subtask: Subtask) -> bool:

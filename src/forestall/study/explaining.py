@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from forestall.assembly.configuration import Given, choices
-from forestall.assembly.kept import KeptObservations
+from forestall.assembly.kept import picture_of
 from forestall.assembly.parts import Assembly
 from forestall.config import cache_dir
 from forestall.domain.model import Domain
@@ -58,15 +58,7 @@ class Remembered:
             MemoryFileError: it was, and is damaged.
         """
         step = _step(self, reference)
-        if step is None:
-            return None
-        if step.image is not None:
-            with open_store(self.path) as store:
-                return store.get_image(step.image)
-        if step.observation is None:
-            return None
-        frames = KeptObservations(self.path).get(step.observation, domain).frames
-        return frames[-1].rgb if frames else None
+        return None if step is None else picture_of(self.path, step, domain)
 
 
 def memory_of(record: EpisodeRecord, given: Path | None = None) -> Remembered | None:
