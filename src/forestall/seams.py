@@ -213,6 +213,8 @@ class DataSet(Protocol):
     name: str
     domain: str
     """The name of the domain in whose words its plans are."""
+    options: Mapping[str, Mapping[str, Any]]
+    """Kind of part → options that its pictures need."""
 
     def __len__(self) -> int:
         """How many runs there may be."""

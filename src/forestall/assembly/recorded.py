@@ -110,7 +110,8 @@ def open_data(name: str, folder: Path, given: Given) -> Opened:
         InputError: no folder of one, or a part that is not valid.
     """
     data: DataSet = data_set(name)(folder)
-    eyes = eyes_for(given.over(Given.named({DOMAIN.name: data.domain})))
+    needed = {kind: (None, options) for kind, options in data.options.items()}
+    eyes = eyes_for(given.over(Given.of({DOMAIN.name: (data.domain, {}), **needed})))
     return Opened(data, eyes.domain, eyes)
 
 

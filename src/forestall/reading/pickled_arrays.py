@@ -110,7 +110,7 @@ def _filled(raw: Any, kind: Any, shape: Any, order: str) -> npt.NDArray[Any]:
             f"an array in it needs {prod(shape) * dtype.itemsize} bytes for {shape} {dtype}, "
             f"there are {len(raw)}"
         )
-    flat = np.frombuffer(raw, dtype)
+    flat = np.frombuffer(raw, dtype).astype(dtype.newbyteorder("="), copy=False)
     return flat.reshape(shape, order="F" if order == "F" else "C")
 
 

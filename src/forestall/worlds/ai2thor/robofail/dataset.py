@@ -6,14 +6,15 @@ with its reason, and the next one is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from forestall.domain.model import Domain
 from forestall.errors import ForestallError
 from forestall.types.recorded import RecordedRun, Unread
-from forestall.worlds.ai2thor.robofail.layout import episode_folders, read_episode
+from forestall.worlds.ai2thor.robofail.layout import MOST_FRAMES, episode_folders, read_episode
 from forestall.worlds.ai2thor.robofail.looks import looks_of, spans_of, step_at
 
 
@@ -29,6 +30,8 @@ class RoboFail:
 
     name = "robofail"
     domain = "ai2thor"
+    options: Mapping[str, Mapping[str, Any]] = {"perceiver": {"most_equal": MOST_FRAMES}}
+    """A renderer gives the same picture while nothing moves, for as long as that is."""
 
     def __init__(self, folder: Path) -> None:
         self._folders = episode_folders(folder)

@@ -30,9 +30,7 @@ def failed_at(step: Any, reason: Any) -> tuple[int, int] | None:
         FileFormatError: something else, or nothing, though there is a reason.
     """
     if not isinstance(reason, str) or not reason.strip():
-        raise FileFormatError(
-            "gt_failure_reason: why it failed, or 'No failure added', is missing"
-        )
+        raise FileFormatError("gt_failure_reason: why it failed, or 'No failure added', is missing")
     if reason.strip().rstrip(".").casefold() == NO_FAILURE:
         return None
     seconds = list(_seconds(step))

@@ -206,6 +206,8 @@ def _acted(folder: Path, frames: int) -> tuple[tuple[int, str], ...]:
         if words is None:
             raise FileFormatError(f"{path}: {text[:60]!r} is no action of REFLECT's robot")
         found.append((frame, _SKILLS[words]))
+    if len(found) > MOST_STEPS:
+        raise FileFormatError(f"{path} has more than {MOST_STEPS} actions")
     return tuple(sorted(found))
 
 

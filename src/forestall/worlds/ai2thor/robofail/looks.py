@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import SequenceMatcher
 from typing import Any
 
 import numpy as np
@@ -69,10 +68,7 @@ def spans_of(episode: Episode) -> tuple[tuple[Span, ...], tuple[str, ...]]:
     acts = [i for i, step in enumerate(episode.plan) if step.skill != DRIVES]
     steps = [_listed_as(episode.plan.subtasks[i].skill) for i in acts]
     listed = [skill for _, skill in episode.acted]
-    frames = {}
-    for block in SequenceMatcher(None, steps, listed, autojunk=False).get_matching_blocks():
-        for k in range(block.size):
-            frames[acts[block.a + k]] = episode.acted[block.b + k][0]
+    frames = {acts[i]: episode.acted[k][0] for i, k in _paired(steps, listed)}
     found: list[Span] = []
     last = 0
     for number, step in enumerate(episode.plan):
@@ -88,6 +84,24 @@ def spans_of(episode: Episode) -> tuple[tuple[Span, ...], tuple[str, ...]]:
             shown_by = _UNLISTED.get(step.skill, frozenset())
             found.append(Span(number, last + 1, last, shown_by=shown_by))
     return tuple(found), tuple(_unmatched(episode, frames))
+
+
+def _paired(one: Sequence[str], other: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """The longest common subsequence, as indices of both."""
+    best = np.zeros((len(one) + 1, len(other) + 1), dtype=int)
+    for i in reversed(range(len(one))):
+        for k in reversed(range(len(other))):
+            same = 1 + best[i + 1, k + 1] if one[i] == other[k] else 0
+            best[i, k] = max(same, best[i + 1, k], best[i, k + 1])
+    i = k = 0
+    while i < len(one) and k < len(other):
+        if one[i] == other[k] and best[i, k] == 1 + best[i + 1, k + 1]:
+            yield i, k
+            i, k = i + 1, k + 1
+        elif best[i + 1, k] == best[i, k]:
+            i += 1
+        else:
+            k += 1
 
 
 def _unmatched(episode: Episode, frames: Mapping[int, int]) -> Iterator[str]:
