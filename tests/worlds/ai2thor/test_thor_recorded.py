@@ -1,4 +1,4 @@
-"""Episodes of the stand-in in RoboFail's layout: demonstrations, labelled failures, judges on them."""
+"""Episodes in RoboFail's layout: demonstrations, labelled failures, and judges on them."""
 
 import json
 import os
@@ -109,11 +109,11 @@ def demonstrations(out: Path) -> list[Demonstration]:
         return list(store.all())
 
 
-def node(graph: SceneGraph, name: str) -> dict[str, str]:
-    """The states of a thing in a graph."""
+def state(graph: SceneGraph, name: str, attribute: str) -> str | None:
+    """The state of a thing in a graph."""
     found = graph.get(name)
     assert found is not None
-    return dict(found.states)
+    return found.state(attribute)
 
 
 def test_good_runs_become_demonstrations(demonstrations: list[Demonstration]) -> None:
@@ -130,9 +130,9 @@ def test_each_step_has_what_was_seen_before_it(demonstrations: list[Demonstratio
     steps = demonstrations[0].steps
     held = [s.whole.holding for s in steps]
     assert held == [None, None, "Pot-1", "Pot-1", None, None, None]
-    filled = [node(s.whole, "Pot-1").get("filled") for s in (steps[1], steps[6])]
+    filled = [state(s.whole, "Pot-1", "filled") for s in (steps[1], steps[6])]
     assert filled == ["empty", "water"]
-    toggled = [node(s.whole, "Faucet-1").get("toggled") for s in steps[4:]]
+    toggled = [state(s.whole, "Faucet-1", "toggled") for s in steps[4:]]
     assert toggled == ["off", "on", "off"]
     assert ("Pot-1", "inside", "Sink-1") in {
         (r.subject, r.predicate, r.object) for r in steps[6].whole.relations
@@ -145,7 +145,7 @@ def test_things_are_where_the_metadata_has_them(data: Data) -> None:
     """The pot of the stand-in's kitchen: x -0.60, z 2.02 there, on a worktop of 0.90 m."""
     pot = data.runs[0].run.scenes[1].get("Pot-1")
     assert pot is not None
-    assert pot.position_world_m == pytest.approx((-0.60, 2.02, 0.965), abs=0.06)
+    assert pot.centroid_m == pytest.approx((-0.60, 2.02, 0.965), abs=0.06)
 
 
 def test_failing_runs_are_labelled_and_keep_their_scenes(out: Path) -> None:
@@ -159,7 +159,7 @@ def test_failing_runs_are_labelled_and_keep_their_scenes(out: Path) -> None:
 
 
 def test_what_could_not_be_used_is_counted_and_told_with_its_name(
-    out: Path, tmp_path: Path
+    out: Path
 ) -> None:
     report = json.loads((out / REPORT).read_text())
     assert (report["good"], report["failing"], report["not_read"]) == (2, 2, 1)
@@ -172,10 +172,9 @@ def test_the_imported_scenes_are_checked_with_the_imported_memory(
     out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = out / FAILING / "fillPot-4"
-    code = call(
-        ["check", str(folder / "004.json"), "--subtask", "put_in(Pot, Sink)", "--json"]
-        + ["--memory", str(out / MEMORY), "--domain", "ai2thor"]
-    )
+    scene, memory = str(folder / "004.json"), str(out / MEMORY)
+    said = ["--subtask", "put_in(Pot, Sink)", "--memory", memory, "--domain", "ai2thor", "--json"]
+    code = call(["check", scene, *said])
     told = json.loads(capsys.readouterr().out)
     assert code == 1
     assert told["scenes"][0]["outcome"] in ("replan", "hold")
