@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from forestall.errors import FileFormatError
 from forestall.reading import pickles
 from forestall.reading.pickles import Made, read_pickle
 
-ARRAYS = {
+ARRAYS: dict[str, npt.NDArray[Any]] = {
     "rows": np.arange(12, dtype=np.float32).reshape(3, 4),
     "part": np.arange(24, dtype=np.uint8).reshape(2, 3, 4)[:, :, :3],
     "columns": np.asfortranarray(np.arange(6, dtype=np.int64).reshape(2, 3)),

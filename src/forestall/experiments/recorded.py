@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Any
 
 from forestall.assembly.recorded import Opened, SeenRun
@@ -71,7 +72,7 @@ def judge_recorded(
     reading: Progress,
     judging: Progress,
 ) -> list[JudgedRun]:
-    """Judge every run of a data set.
+    """Judge every run of a data set; the graphs of one task are in memory at a time.
 
     Args:
         opened: the data set.
@@ -83,28 +84,28 @@ def judge_recorded(
     Raises:
         InputError: nothing of it could be read.
     """
-    seen = list(opened.seen(report, reading))
-    if not seen:
-        why = f": {report.unread[0].name}: {report.unread[0].why}" if report.unread else ""
-        raise InputError(f"no run of {opened.data.name} can be judged{why}")
     found: list[JudgedRun] = []
-    for task in dict.fromkeys(s.run.task for s in seen):
-        runs = [s for s in seen if s.run.task == task]
+    seen = opened.seen(report, reading)
+    for task, several in groupby(seen, lambda s: s.run.task):
+        runs = list(several)
         given = [d for d in memory if d.task == task]
         goal = _goal(task, opened.domain)
+        known = Knowledge(opened.domain.name, WITH_MEMORY if memory else OWN)
         shared: dict[str, Judge] | None = None
         for each in runs:
-            judging(len(found), len(seen), each.run.name)
+            run = each.run
+            judging(len(found), len(opened.data), run.name)
             if each.good or shared is None:
                 panel = panel_of([*_shown(runs, each), *given], opened.domain)
                 shared = shared if each.good else panel
             else:
                 panel = shared
-            said = said_of(each.run, panel, opened.domain.skills, ahead=True, goal=goal)
-            known = Knowledge(opened.domain.name, WITH_MEMORY if memory else OWN)
-            run = each.run
+            said = said_of(run, panel, opened.domain.skills, ahead=True, goal=goal)
             judged = Judged(run.name, run.program, run.change, known, said)
             found.append(JudgedRun(judged, each.recorded.fails))
+    if not found:
+        why = f": {report.unread[0].name}: {report.unread[0].why}" if report.unread else ""
+        raise InputError(f"no run of {opened.data.name} can be judged{why}")
     return found
 
 

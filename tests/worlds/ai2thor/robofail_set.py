@@ -129,19 +129,25 @@ def event_of(kitchen: Kitchen) -> Event:
     return event
 
 
+def at_start() -> Kitchen:
+    """The stand-in's kitchen through the camera of REFLECT's robot."""
+    kitchen = Kitchen(SIZE, SIZE)
+    kitchen.step({"action": "Initialize", "fieldOfView": 60.0})
+    return kitchen
+
+
 @dataclass
 class Robot:
     """REFLECT's robot: carries a plan out, and writes an event down for each second."""
 
     folder: Path
     start: tuple[float, float] = (0.0, 0.0)
-    kitchen: Kitchen = field(default_factory=lambda: Kitchen(SIZE, SIZE))
+    kitchen: Kitchen = field(default_factory=at_start)
     frames: int = 0
     acted: dict[int, str] = field(default_factory=dict)
     drove: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.kitchen.step({"action": "Initialize", "fieldOfView": 60.0})
         x, z = self.start
         self.kitchen.step({"action": "Teleport", "position": {"x": x, "z": z}})
         (self.folder / "events").mkdir(parents=True)

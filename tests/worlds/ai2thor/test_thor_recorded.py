@@ -158,9 +158,7 @@ def test_failing_runs_are_labelled_and_keep_their_scenes(out: Path) -> None:
     assert scenes == [*(f"00{n}.json" for n in range(1, 8)), "plan.txt"]
 
 
-def test_what_could_not_be_used_is_counted_and_told_with_its_name(
-    out: Path
-) -> None:
+def test_what_could_not_be_used_is_counted_and_told_with_its_name(out: Path) -> None:
     report = json.loads((out / REPORT).read_text())
     assert (report["good"], report["failing"], report["not_read"]) == (2, 2, 1)
     assert report["why_not"][0]["run"] == "fillPot-5"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builds import needs_package
-from robofail_set import BOIL_WATER, SIZE, Kitchen, event_of, named_as_the_package
+from robofail_set import BOIL_WATER, SIZE, at_start, event_of, named_as_the_package
 
 from forestall.domain.load import shipped
 from forestall.errors import FileFormatError
@@ -246,6 +246,14 @@ def test_what_is_wrong_with_an_episode_is_told_and_the_next_one_is_read(
     assert isinstance(second, RecordedRun)
 
 
+def test_two_episodes_of_one_name_are_told_apart_from_one(tmp_path: Path) -> None:
+    episode(tmp_path / "a")
+    episode(tmp_path / "b")
+    first, second = RoboFail(tmp_path).runs(shipped("ai2thor"))
+    assert isinstance(first, RecordedRun) and isinstance(second, Unread)
+    assert "has the name of" in second.why
+
+
 def test_an_episode_of_too_many_events_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -258,14 +266,12 @@ def test_an_episode_of_too_many_events_is_refused(
 
 
 @pytest.fixture(scope="module")
-def kitchen() -> Kitchen:
-    made = Kitchen(SIZE, SIZE)
-    made.step({"action": "Initialize", "fieldOfView": 60.0})
-    return made
+def kitchen() -> Any:
+    return at_start()
 
 
 @pytest.fixture(scope="module")
-def stored(kitchen: Kitchen) -> bytes:
+def stored(kitchen: Any) -> bytes:
     with named_as_the_package():
         return pickle.dumps(event_of(kitchen), protocol=pickle.HIGHEST_PROTOCOL)
 
@@ -277,7 +283,7 @@ def kept(tmp_path: Path, data: bytes) -> Path:
 
 
 def test_an_event_has_its_picture_depth_masks_and_camera(
-    tmp_path: Path, kitchen: Kitchen, stored: bytes
+    tmp_path: Path, kitchen: Any, stored: bytes
 ) -> None:
     event = read_event(kept(tmp_path, stored))
     assert event.metadata == kitchen.metadata(1)["agents"][0]
@@ -295,7 +301,7 @@ def test_an_event_has_its_picture_depth_masks_and_camera(
 
 @needs_package
 def test_an_event_of_the_package_itself_is_read_the_same(
-    tmp_path: Path, kitchen: Kitchen, stored: bytes
+    tmp_path: Path, kitchen: Any, stored: bytes
 ) -> None:
     from ai2thor.server import DepthFormat, Event
 
@@ -334,7 +340,7 @@ def test_a_cut_event_is_told(tmp_path: Path, stored: bytes, share: float) -> Non
     ],
 )
 def test_an_event_without_what_is_needed_is_told(
-    tmp_path: Path, kitchen: Kitchen, attribute: str, value: Any, why: str
+    tmp_path: Path, kitchen: Any, attribute: str, value: Any, why: str
 ) -> None:
     event = event_of(kitchen)
     setattr(event, attribute, value)

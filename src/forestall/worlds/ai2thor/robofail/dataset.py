@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from forestall.domain.model import Domain
-from forestall.errors import ForestallError
+from forestall.errors import FileFormatError, ForestallError
 from forestall.types.recorded import RecordedRun, Unread
 from forestall.worlds.ai2thor.robofail.layout import MOST_FRAMES, episode_folders, read_episode
 from forestall.worlds.ai2thor.robofail.looks import looks_of, spans_of, step_at
@@ -41,8 +41,12 @@ class RoboFail:
 
     def runs(self, domain: Domain) -> Iterator[RecordedRun | Unread]:
         """Every episode in the order of its number; events are read as looks are asked for."""
+        read: dict[str, Path] = {}
         for folder in self._folders:
             try:
+                first = read.setdefault(folder.name, folder)
+                if first != folder:
+                    raise FileFormatError(f"{folder} has the name of {first}: import it alone")
                 yield _run(folder, domain)
             except ForestallError as error:
                 yield Unread(folder.name, str(error))
