@@ -110,12 +110,23 @@ def judge_recorded(
 
 
 def lines_of(judged: Sequence[JudgedRun]) -> list[Line]:
-    """The table: shares with 95 % intervals, those of failing runs drawn by task."""
-    tables: list[list[Row]] = [rows([j.until(more) for j in judged]) for more in (0, 1, None)]
+    """The table: shares with 95 % intervals, those of failing runs drawn by task.
+
+    Of one task alone its runs are taken for independent.
+    """
+    tables: list[list[Row]] = [
+        rows(_in_units([j.until(more) for j in judged])) for more in (0, 1, None)
+    ]
     return [
         Line(at.judge, at.false_alarms, at.detected, after.detected, ever.detected)
         for at, after, ever in zip(*tables, strict=True)
     ]
+
+
+def _in_units(judged: Sequence[Judged]) -> list[Judged]:
+    """Runs with what they are drawn by as their program."""
+    several = len({j.program for j in judged if j.change}) > 1
+    return [replace(j, program=j.program if several else j.run) for j in judged]
 
 
 def _shown(runs: Sequence[SeenRun], judged: SeenRun) -> list[Demonstration]:
