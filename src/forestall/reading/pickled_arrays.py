@@ -63,8 +63,9 @@ def fill(array: npt.NDArray[Any], state: tuple[Any, ...]) -> None:
         raise ValueError("an array in it has no values, or gets them twice")
     _, shape, kind, columns, raw = state
     values = _filled(raw, kind, shape, "F" if columns else "C")
-    columns = bool(columns)  # numpy wants an integer there, its stub a truth value of its own
-    array.__setstate__((1, shape, values.dtype, columns, bytes(raw)))  # type: ignore[arg-type]
+    rows_first = False  # numpy wants an integer there, its stub a truth value of its own
+    said = (1, shape, values.dtype, rows_first, values.tobytes())
+    array.__setstate__(said)  # type: ignore[arg-type]
 
 
 def array_of(name: str, given: tuple[Any, ...]) -> Any:
