@@ -63,8 +63,8 @@ def fill(array: npt.NDArray[Any], state: tuple[Any, ...]) -> None:
         raise ValueError("an array in it has no values, or gets them twice")
     _, shape, kind, columns, raw = state
     values = _filled(raw, kind, shape, "F" if columns else "C")
-    rows_first = False  # numpy wants an integer there, its stub a truth value of its own
-    said = (1, shape, values.dtype, rows_first, values.tobytes())
+    columns_first = False  # numpy wants an integer there, its stub a truth value of its own
+    said = (1, shape, values.dtype, columns_first, values.tobytes())
     array.__setstate__(said)  # type: ignore[arg-type]
 
 
