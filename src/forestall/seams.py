@@ -31,6 +31,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.kind import Kind
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
+from forestall.types.recorded import RecordedRun, Unread
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.scene import SceneNeeds
 from forestall.types.story import Located, Tried, Verified
@@ -205,6 +206,22 @@ class Foreign(Protocol):
 
     def domains(self) -> Mapping[str, Domain]:
         """Its domain, in one or several versions, each by what it is called in tables."""
+
+
+class DataSet(Protocol):
+    """Runs that somebody else recorded, in a folder; made with the folder."""
+
+    name: str
+    domain: str
+    """The name of the domain in whose words its plans are."""
+    options: Mapping[str, Mapping[str, Any]]
+    """Kind of part → options that its pictures need."""
+
+    def __len__(self) -> int:
+        """How many runs there may be."""
+
+    def runs(self, domain: Domain) -> Iterator[RecordedRun | Unread]:
+        """Each run, or why it cannot be used."""
 
 
 class Parts(Protocol):

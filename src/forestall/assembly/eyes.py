@@ -43,6 +43,11 @@ class Eyes:
         self._scenes, self._words = Scenes(domain), Words(domain)
         self._robot_m: Vec3 = (0.0, 0.0, 0.0)
 
+    @property
+    def domain(self) -> Domain:
+        """Whose words are matched."""
+        return self._domain
+
     def begin(self) -> None:
         """Another demonstration: nothing of the last one is remembered."""
         self._perceiver.reset()
@@ -71,6 +76,12 @@ class Eyes:
         wanted = self._domain.check(self._words.subtask(said))
         ground = ground_subtask(wanted, graph, self._domain, self._robot_m, {})
         return ground, self.scope(graph, ground)
+
+    def acted(self, subtask: Subtask, succeeded: bool) -> None:
+        """A skill was carried out: a perceiver that knows skills doubts what it may change."""
+        told = getattr(self._perceiver, "acted", None)
+        if told is not None:
+            told(subtask, succeeded)
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
         """The part of a graph that concerns a subtask."""

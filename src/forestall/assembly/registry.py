@@ -188,6 +188,12 @@ FOREIGN: Mapping[str, str] = {
 """Households that somebody else wrote (`seams.Foreign`): no part of a run. Others add theirs by
 entry point, group "forestall.third-party"."""
 
+DATA_SETS: Mapping[str, str] = {
+    "robofail": "forestall.worlds.ai2thor.robofail.dataset:RoboFail",
+}
+"""Recorded runs of others (`seams.DataSet`), each made with its folder: no part of a run. Others
+add theirs by entry point, group "forestall.data-set"."""
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -270,14 +276,28 @@ def foreign(name: str) -> Callable[..., Any]:
         UnknownNameError: no such household.
         InputError: it is known and cannot be imported.
     """
-    others = {e.name: e.value for e in _entries("third-party")}
-    target = FOREIGN.get(name, others.get(name))
+    return _of_others("household", name, FOREIGN, "third-party")
+
+
+def data_set(name: str) -> Callable[..., Any]:
+    """What opens recorded runs of others, by the name of their data set.
+
+    Raises:
+        UnknownNameError: no such data set.
+        InputError: it is known and cannot be imported.
+    """
+    return _of_others("data set", name, DATA_SETS, "data-set")
+
+
+def _of_others(what: str, name: str, shipped: Mapping[str, str], group: str) -> Callable[..., Any]:
+    others = {e.name: e.value for e in _entries(group)}
+    target = shipped.get(name, others.get(name))
     if target is None:
-        raise UnknownNameError("household", name, (*FOREIGN, *others))
+        raise UnknownNameError(what, name, (*shipped, *others))
     try:
         return _imported(target)
     except ImportError as error:
-        raise InputError(f"household {name!r} cannot be loaded ({target}): {error}") from error
+        raise InputError(f"{what} {name!r} cannot be loaded ({target}): {error}") from error
 
 
 def _entries(kind: str) -> tuple[EntryPoint, ...]:

@@ -17,6 +17,7 @@ from forestall.cli.doctor import doctor
 from forestall.cli.domain import domain
 from forestall.cli.encoder import encoder
 from forestall.cli.flags import spelt
+from forestall.cli.importing import import_
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
@@ -35,6 +36,7 @@ app = App(
 )
 for command in (run, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
+app.command(import_, name="import")
 app.command(demos)
 app.command(domain)
 app.command(bench)

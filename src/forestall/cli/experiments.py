@@ -6,13 +6,13 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from forestall.cli.flags import AblationFlags, ComparingFlags
+from forestall.cli.flags import AblationFlags, ComparingFlags, SeeingFlags
 
 if TYPE_CHECKING:
     from forestall.experiments.cost import Cost
@@ -83,9 +83,28 @@ def proactive(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> 
     return _experiment("proactive", options, parts)
 
 
-def detection(*, options: Options = DEFAULTS, parts: ComparingFlags = PARTS) -> int:
-    """The paper's Fig. 8a: what detectors find, how early, and how often they cry wolf."""
-    return _experiment("detection", options, parts)
+def detection(
+    *, data: str | None = None, options: Options = DEFAULTS, parts: ComparingFlags = PARTS
+) -> int:
+    """The paper's Fig. 8a: what detectors find, how early, and how often they cry wolf.
+
+    Args:
+        data: recorded runs of others to judge, in the place of runs of our own: robofail:FOLDER
+            (docs/robofail.md). Of the other options --memory, --json and --quiet are for them.
+        options: of the experiment.
+        parts: which parts.
+    """
+    if data is None:
+        return _experiment("detection", options, parts)
+    from forestall.cli.importing import bench_data
+    from forestall.errors import InputError
+
+    for_data = replace(DEFAULTS, as_json=options.as_json, quiet=options.quiet)
+    if options != for_data:
+        own = next(f.name for f in fields(Options) if _differ(options, for_data, f.name))
+        raise InputError(f"--{own} says nothing of recorded runs: leave it out with --data")
+    seeing = SeeingFlags(**{f.name: getattr(parts, f.name) for f in fields(SeeingFlags)})
+    return bench_data(data, parts.memory, seeing, as_json=options.as_json, quiet=options.quiet)
 
 
 def ablation(*, options: Options = DEFAULTS, parts: AblationFlags = ABLATED) -> int:
@@ -130,6 +149,10 @@ def register(bench: App) -> None:
     for command in (proactive, detection, ablation, transfer, report):
         bench.command(command)
     bench.command(everything, name="all")
+
+
+def _differ(one: Options, other: Options, name: str) -> bool:
+    return bool(getattr(one, name) != getattr(other, name))
 
 
 def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:

@@ -71,7 +71,7 @@ def third_party(
         "needs": [r.to_json() for r in needs],
     }
     if out is not None:
-        replace_file(out, json.dumps({**data, "runs": [_run(j) for j in judged]}).encode())
+        replace_file(out, json.dumps({**data, "runs": [told(j) for j in judged]}).encode())
     if as_json:
         print(json.dumps(data, indent=2))
         return 0
@@ -83,7 +83,7 @@ def third_party(
                 r.knowledge.domain,
                 r.knowledge.memory,
                 r.judge,
-                *map(_share, (r.false_alarms, r.detected, r.at)),
+                *map(share, (r.false_alarms, r.detected, r.at)),
             )
             for r in found
         ],
@@ -96,12 +96,12 @@ def third_party(
         )
     print_table(
         ("true by", f"from {ENOUGH} demonstrations", "precision", "recall", "skills"),
-        [(r.domain, r.what, _share(r.precision), _share(r.recall), str(r.skills)) for r in needs],
+        [(r.domain, r.what, share(r.precision), share(r.recall), str(r.skills)) for r in needs],
     )
     return 0
 
 
-def _run(judged: Judged) -> dict[str, object]:
+def told(judged: Judged) -> dict[str, object]:
     """Everything that was said of a run."""
     said = [
         {name: [one.score, one.alarm, one.note] for name, one in boundary.items()}
@@ -117,7 +117,7 @@ def _run(judged: Judged) -> dict[str, object]:
     }
 
 
-def _share(metric: Metric) -> str:
+def share(metric: Metric) -> str:
     """A share with its interval."""
     if metric.value is None:
         return "-"

@@ -19,7 +19,15 @@ from forestall.comparison.preconditions import needed
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.experiments.conduct import Progress
-from forestall.experiments.third_party_rows import NEEDS, PLAN, SCORE, Judged, Knowledge, Said
+from forestall.experiments.third_party_rows import (
+    JUDGES,
+    NEEDS,
+    PLAN,
+    SCORE,
+    Judged,
+    Knowledge,
+    Said,
+)
 from forestall.kinds import DETECTOR, RETRIEVER, VALIDATOR
 from forestall.learning.learn import learn
 from forestall.planning.validate import GraphValidator
@@ -82,7 +90,7 @@ def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = Fals
                 geometry = foreign.geometry if domain is None else ()
                 seen = [without(r, geometry).demonstration() for r in shown]
                 own_domain = domain or learn(seen, hands=foreign.hands).domain
-                panel = _panel(seen, own_domain, learnt=domain is None)
+                panel = panel_of(seen, own_domain, learnt=domain is None)
                 for run in runs:
                     said = said_of(
                         without(run, geometry), panel, own_domain.skills, domain is not None
@@ -94,11 +102,18 @@ def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = Fals
     return judged
 
 
-def _panel(memory: Sequence[Demonstration], domain: Domain, learnt: bool) -> dict[str, Judge]:
-    """The judges with some demonstrations and the domain that is known, or that they show."""
+def panel_of(
+    memory: Sequence[Demonstration], domain: Domain, learnt: bool = False
+) -> dict[str, Judge]:
+    """The judges with some demonstrations and the domain that is known, or that they show.
+
+    Without a demonstration only the plan check is left.
+    """
     parts = Assembly(choices(DEFAULTS), domain, memory, {"states": {}})
-    retriever = parts.part(RETRIEVER)
     checked = GraphValidator(weighed(domain, memory)) if learnt else parts.part(VALIDATOR)
+    if not memory:
+        return {PLAN: PlanJudge(checked, PLAN)}
+    retriever = parts.part(RETRIEVER)
     return {
         SCORE: DetectorJudge(parts.part(DETECTOR, "scene-graph"), retriever),
         NEEDS: DetectorJudge(parts.part(DETECTOR, "preconditions"), retriever),
@@ -146,9 +161,9 @@ def without(run: ForeignRun, geometry: Sequence[str]) -> ForeignRun:
     """A run whose scenes leave out some relations."""
     if not geometry:
         return run
-    scenes = tuple(_plain(g, geometry) for g in run.scenes)
+    scenes, scoped = (tuple(_plain(g, geometry) for g in gs) for gs in (run.scenes, run.scoped))
     final = None if run.final is None else _plain(run.final, geometry)
-    return replace(run, scenes=scenes, final=final)
+    return replace(run, scenes=scenes, final=final, scoped=scoped)
 
 
 def _plain(graph: SceneGraph, geometry: Sequence[str]) -> SceneGraph:
@@ -157,7 +172,11 @@ def _plain(graph: SceneGraph, geometry: Sequence[str]) -> SceneGraph:
 
 
 def said_of(
-    run: ForeignRun, panel: Mapping[str, Judge], skills: Collection[str], ahead: bool
+    run: ForeignRun,
+    panel: Mapping[str, Judge],
+    skills: Collection[str],
+    ahead: bool,
+    goal: Goal | None = None,
 ) -> tuple[Mapping[str, Said], ...]:
     """What each judge says before each step that the run came to.
 
@@ -167,31 +186,33 @@ def said_of(
         skills: those of the judges' domain. What nobody has shown is not judged, neither as the
             next step nor as a later one.
         ahead: whether the judges see the rest of the plan, or its next step alone.
+        goal: what the plan is to reach; by default it is only to run.
     """
     found = []
-    for context in _boundaries(run, skills, ahead):
-        if context.subtask.skill not in skills:
-            found.append(dict.fromkeys(panel, NOT_JUDGED))
-            continue
-        verdicts = {name: judge.judge(context) for name, judge in panel.items()}
-        found.append(
-            {
+    for context in _boundaries(run, skills, ahead, goal or Goal(run.task)):
+        said = dict.fromkeys(JUDGES, NOT_JUDGED)
+        if context.subtask.skill in skills:
+            verdicts = {name: judge.judge(context) for name, judge in panel.items()}
+            said |= {
                 name: Said(v.score, v.decision is not Decision.PROCEED, v.note)
                 for name, v in verdicts.items()
             }
-        )
+        found.append(said)
     return tuple(found)
 
 
-def _boundaries(run: ForeignRun, skills: Collection[str], ahead: bool) -> Iterator[BoundaryContext]:
+def _boundaries(
+    run: ForeignRun, skills: Collection[str], ahead: bool, goal: Goal
+) -> Iterator[BoundaryContext]:
     steps = run.plan.subtasks
     unknown = [i for i, step in enumerate(steps) if step.skill not in skills]
     for at, scene in enumerate(run.scenes):
         first = max((i + 1 for i in unknown if i < at), default=0)
         last = min((i for i in unknown if i > at), default=len(steps)) if ahead else at + 1
         plan = replace(run.plan, subtasks=steps[first:last])
-        task = Task(run.task, run.task, Goal(run.task), plan, SceneNeeds())
-        scoped = replace(scene, subtask=steps[at])
+        task = Task(run.task, run.task, goal, plan, SceneNeeds())
+        scoped = run.concerns(at)
+        step = scoped.subtask or steps[at]
         yield BoundaryContext(
-            task, plan, at - first, at, steps[at], scene, scoped, None, looks=2, may_look=False
+            task, plan, at - first, at, step, scene, scoped, None, looks=2, may_look=False
         )

@@ -135,7 +135,7 @@ def rows(judged: Sequence[Judged]) -> list[Row]:
             found.append(_row(knowledge, which, own, [j.alarms(which) for j in own]))
         for which, judge in CALIBRATED.items():
             lines = _lines(own, judge)
-            alarms = [j.below(judge, lines[j.program]) for j in own]
+            alarms = [j.below(judge, lines.get(j.program, lines[""])) for j in own]
             found.append(_row(knowledge, which, own, alarms))
     return found
 
@@ -151,9 +151,9 @@ def changes(judged: Sequence[Judged], knowledge: Knowledge) -> list[tuple[str, i
 
 
 def _lines(judged: Sequence[Judged], judge: str) -> dict[str, float | None]:
-    """Program → threshold, from the good runs of all others."""
+    """Program → threshold, from the good runs of all others; "": from those of all."""
     worst = {j.program: j.extreme(judge) for j in judged if not j.change}
-    return {p: threshold([e for q, e in worst.items() if q != p], LEVEL) for p in worst}
+    return {p: threshold([e for q, e in worst.items() if q != p], LEVEL) for p in (*worst, "")}
 
 
 def _row(

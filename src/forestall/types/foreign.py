@@ -25,6 +25,8 @@ class ForeignRun:
         final: what was seen after the last one, None where a step was refused.
         change: which sort of change makes it fail, "" for a good one.
         why: why the last step was refused, in the words of who executed it.
+        scoped: what of each scene concerns its step, with the step in the names of the scene; where
+            it is empty, all of it does.
     """
 
     name: str
@@ -35,16 +37,24 @@ class ForeignRun:
     final: SceneGraph | None = None
     change: str = ""
     why: str = ""
+    scoped: tuple[SceneGraph, ...] = ()
 
     @property
     def fails(self) -> int | None:
         """Index of the step that was refused, None for a run that went well."""
         return None if self.final is not None else len(self.scenes) - 1
 
+    def concerns(self, at: int) -> SceneGraph:
+        """What of a scene concerns its step."""
+        step = self.plan.subtasks[at]
+        return self.scoped[at] if self.scoped else replace(self.scenes[at], subtask=step)
+
     def demonstration(self) -> Demonstration:
-        """The run as a demonstration, every graph whole."""
-        steps = tuple(
-            DemonstrationStep(i, s, replace(g, subtask=s), replace(g, subtask=s))
-            for i, (s, g) in enumerate(zip(self.plan, self.scenes, strict=True))
-        )
-        return Demonstration(self.task, self.program, 0, steps, id=self.name, final=self.final)
+        """The run as a demonstration."""
+        steps = []
+        for at, (step, scene) in enumerate(zip(self.plan, self.scenes, strict=True)):
+            scoped = self.concerns(at)
+            meant = scoped.subtask or step
+            steps.append(DemonstrationStep(at, meant, scoped, replace(scene, subtask=meant)))
+        made = tuple(steps)
+        return Demonstration(self.task, self.program, 0, made, id=self.name, final=self.final)

@@ -1,0 +1,260 @@
+"""Recorded runs of others, seen as a monitor sees: one look at a time, into graphs.
+
+Called by `forestall import` and `bench detection --data`; calls a data set (`seams.DataSet`) and
+`eyes`. Of a run the graphs before its steps are kept, never its pictures.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from forestall.assembly.configuration import Given
+from forestall.assembly.eyes import Eyes, eyes_for
+from forestall.assembly.registry import DATA_SETS, data_set
+from forestall.domain.model import Domain
+from forestall.errors import (
+    FileFormatError,
+    ForestallError,
+    InputError,
+    ObservationError,
+    PerceptionError,
+)
+from forestall.files import replace_file
+from forestall.kinds import DOMAIN
+from forestall.memory.store import open_store
+from forestall.seams import DataSet
+from forestall.types.foreign import ForeignRun
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
+from forestall.types.plan import Subtask
+from forestall.types.recorded import ReadReport, RecordedRun, Unread
+
+FAILED = "failed"
+"""What makes a run fail of which nobody says it."""
+
+MEMORY, LABELS, REPORT, FAILING = "memory.db", "failing.json", "report.json", "failing"
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class SeenRun:
+    """A recorded run and what was seen of it.
+
+    Args:
+        recorded: the run.
+        run: its scenes, as far as its steps have one; whole for a good run.
+    """
+
+    recorded: RecordedRun
+    run: ForeignRun
+
+    @property
+    def good(self) -> bool:
+        """Whether it went well."""
+        return self.recorded.fails is None
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Nobody is told how far it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A data set with the domain and the eyes that it is seen with."""
+
+    data: DataSet
+    domain: Domain
+    eyes: Eyes
+
+    def seen(self, report: ReadReport, progress: Progress = _silent) -> Iterator[SeenRun]:
+        """Every run that can be used, one after the other.
+
+        Args:
+            report: is told what came of each.
+            progress: told how far it is.
+        """
+        for done, run in enumerate(self.data.runs(self.domain)):
+            progress(done, len(self.data), run.name)
+            unread = run if isinstance(run, Unread) else None
+            if isinstance(run, RecordedRun):
+                notes = list(run.left_out)
+                try:
+                    seen = _seen(run, self.eyes, notes)
+                except ForestallError as error:
+                    unread = Unread(run.name, str(error))
+                else:
+                    (report.good if seen.good else report.failing).append(run.name)
+                    if notes:
+                        report.notes[run.name] = notes
+                    yield seen
+            if unread is not None:
+                report.unread.append(unread)
+
+
+def open_data(name: str, folder: Path, given: Given) -> Opened:
+    """A data set, in its own domain where no other is said.
+
+    Args:
+        name: of the data set.
+        folder: where it is.
+        given: what was said about parts.
+
+    Raises:
+        UnknownNameError: no such data set.
+        InputError: no folder of one, or a part that is not valid.
+    """
+    data: DataSet = data_set(name)(folder)
+    needed = {kind: (None, options) for kind, options in data.options.items()}
+    eyes = eyes_for(given.over(Given.of({DOMAIN.name: (data.domain, {}), **needed})))
+    return Opened(data, eyes.domain, eyes)
+
+
+def named_data(text: str) -> tuple[str, Path]:
+    """The data set and the folder of "name:folder".
+
+    Raises:
+        InputError: it is not spelt so.
+    """
+    name, colon, folder = text.partition(":")
+    if not colon or not folder:
+        known = " or ".join(f"{name}:FOLDER" for name in DATA_SETS)
+        raise InputError(f"data {text!r}: a data set and its folder are expected, {known}")
+    return name, Path(folder)
+
+
+def import_into(opened: Opened, out: Path, progress: Progress = _silent) -> ReadReport:
+    """Write what a data set shows: a memory, the failing runs with their labels, a report.
+
+    Args:
+        opened: the data set.
+        out: a new folder. In it `memory.db` has the good runs as demonstrations; `failing/<run>/`
+            the scene before each step of a failing one and its plan, as `forestall check` reads
+            them; `failing.json` what is said of when and why they failed; `report.json` what could
+            not be read and why.
+        progress: told how far it is.
+
+    Raises:
+        InputError: the folder is there and has something in it.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out} is there already: name a new folder")
+    out.mkdir(parents=True, exist_ok=True)
+    report, labels = ReadReport(), []
+    with open_store(out / MEMORY, create=True) as store:
+        for seen in opened.seen(report, progress):
+            if seen.good:
+                store.add(seen.run.demonstration())
+            else:
+                _write_scenes(out / FAILING / seen.run.name, seen.run)
+                labels.append(label_of(seen))
+    _write(out / LABELS, labels)
+    _write(out / REPORT, report_of(report))
+    return report
+
+
+def label_of(seen: SeenRun) -> dict[str, Any]:
+    """What the data set says of a failing run, in plain data; steps count from 1."""
+    recorded, run = seen.recorded, seen.run
+    assert recorded.fails is not None, "it failed"
+    return {
+        "run": run.name,
+        "task": run.task,
+        "scene": recorded.scene,
+        "plan": run.plan.texts(),
+        "scenes": len(run.scenes),
+        "fails_at_step": recorded.fails + 1,
+        "seconds": list(recorded.seconds),
+        "kind": recorded.kind,
+        "why": recorded.why,
+    }
+
+
+def report_of(report: ReadReport) -> dict[str, Any]:
+    """Counts, and what could not be used with its reason, in plain data."""
+    return {
+        "good": len(report.good),
+        "failing": len(report.failing),
+        "not_read": len(report.unread),
+        "why_not": [{"run": u.name, "why": u.why} for u in report.unread],
+        "left_out": report.notes,
+    }
+
+
+def _seen(recorded: RecordedRun, eyes: Eyes, notes: list[str]) -> SeenRun:
+    """Look at a run from its first look to its last."""
+    eyes.begin()
+    plan = recorded.plan.subtasks
+    graph: SceneGraph | None = None
+    meant: list[Subtask] = []
+    scenes: list[SceneGraph] = []
+    scoped: list[SceneGraph] = []
+    refused: Counter[str] = Counter()
+    for look in recorded.looks():
+        first = graph is None
+        if first:
+            graph = _look(eyes, look.observation, graph, refused)
+        for number in look.before:
+            if graph is None:
+                raise InputError(f"nothing that can be believed was seen before step {number + 1}")
+            step, concerns = eyes.step(plan[number], graph)
+            meant.append(step)
+            scenes.append(graph)
+            scoped.append(concerns)
+        if look.done is not None:
+            eyes.acted(meant[look.done], look.succeeded)
+        if not first:
+            graph = _look(eyes, look.observation, graph, refused)
+    notes += [f"{n} looks: {why}" for why, n in refused.items()]
+    return SeenRun(recorded, _run(recorded, scenes, scoped, graph))
+
+
+def _look(
+    eyes: Eyes, observation: Observation, before: SceneGraph | None, refused: Counter[str]
+) -> SceneGraph | None:
+    """What is known after a look; as before, where the look cannot be believed."""
+    try:
+        return eyes.see(observation)
+    except (ObservationError, PerceptionError) as error:
+        refused[str(error)] += 1
+        return before
+
+
+def _run(
+    recorded: RecordedRun,
+    scenes: list[SceneGraph],
+    scoped: list[SceneGraph],
+    final: SceneGraph | None,
+) -> ForeignRun:
+    good, steps = recorded.fails is None, len(recorded.plan)
+    if not scenes or (good and len(scenes) < steps):
+        raise FileFormatError(
+            f"only {len(scenes)} of the {steps} steps of its plan have a scene before them"
+        )
+    return ForeignRun(
+        recorded.name,
+        recorded.name if good else recorded.task,
+        recorded.task,
+        recorded.plan,
+        tuple(scenes),
+        final if good else None,
+        "" if good else recorded.kind or FAILED,
+        recorded.why,
+        tuple(scoped),
+    )
+
+
+def _write_scenes(folder: Path, run: ForeignRun) -> None:
+    folder.mkdir(parents=True)
+    for number, scene in enumerate(run.scenes, 1):
+        _write(folder / f"{number:03d}.json", scene.to_json())
+    replace_file(folder / "plan.txt", ("\n".join(run.plan.texts()) + "\n").encode())
+
+
+def _write(path: Path, data: Any) -> None:
+    replace_file(path, (json.dumps(data, indent=1) + "\n").encode())

@@ -1,0 +1,1 @@
+"""RoboFail, the failures that REFLECT recorded in AI2-THOR, as a data set (`docs/robofail.md`)."""
