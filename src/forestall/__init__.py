@@ -64,6 +64,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+DRAWER = "forestall.report.notebook"
+"""Who draws graphs, verdicts, diagnoses and records in notebooks (`types/drawing.py`)."""
+
 _PUBLIC = {
     "Box": "types.graph",
     "Conventions": "perception.scenes",

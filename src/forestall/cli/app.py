@@ -25,6 +25,7 @@ from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
 from forestall.cli.run import run
 from forestall.cli.study import study
+from forestall.cli.view import view
 from forestall.errors import InputError
 
 app = App(
@@ -33,7 +34,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
+for command in (run, view, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
 app.command(demos)
 app.command(domain)

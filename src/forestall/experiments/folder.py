@@ -20,6 +20,7 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
+from forestall.experiments import stored
 from forestall.experiments.runs import Choice
 from forestall.experiments.stored import (
     PACKED,
@@ -36,8 +37,7 @@ from forestall.reading.models import validated
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow
 
 EXPERIMENT = "experiment"
-ABOUT = "experiment.json"
-ROWS = "episodes.jsonl"
+ABOUT, ROWS = stored.ABOUT, stored.ROWS
 EFFORT = "effort.jsonl"
 
 R = TypeVar("R", bound="Row")
