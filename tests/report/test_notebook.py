@@ -28,7 +28,7 @@ def test_a_graph_a_verdict_a_diagnosis_and_a_record_draw_themselves() -> None:
 
 def test_names_cannot_become_markup() -> None:
     record = records.troubled_record()
-    drawn = [record.boundaries[1].verdict, record.boundaries[0].diagnosis, record]
+    drawn: list[object] = [record.boundaries[1].verdict, record.boundaries[0].diagnosis, record]
     drawn += [b.graph for b in record.boundaries]
     for thing in drawn:
         text = html_of(thing)

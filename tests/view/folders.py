@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from forestall.records.record import RunRecorder, write_record
+from forestall.records.record import LINES_NAME, RunRecorder, write_record
 from forestall.types.episode import EpisodeRecord
 from forestall.view.serving import ViewServer, viewing
 from report import records
@@ -32,6 +33,7 @@ def make(folder: Path) -> None:
     write_record(folder / "good", records.potato_record(width=160, height=120))
     write_record(folder / "deep" / "bad", replace(records.unjudged_record(), scenario=None))
     records.follow(RunRecorder(folder / "begun"), records.potato_record(), 9)
+    os.utime(folder / "begun" / LINES_NAME, (1e9, 1e9))  # long ago
     (folder / "damaged").mkdir()
     (folder / "damaged" / "record.json").write_text('{"kind": "episode", ')
     experiment = folder / "experiment"

@@ -114,7 +114,7 @@ def test_what_happens_is_told_while_a_run_goes_on(tmp_path: Path) -> None:
     with shown(tmp_path) as server:
         page = ask(server, "/run/run/")[1]
         follow = page.partition('data-follow="')[2].partition('"')[0].replace("&amp;", "&")
-        connection = http.client.HTTPConnection(*server.server_address[:2], timeout=120)
+        connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=120)
         connection.request("GET", follow)
         stream = connection.getresponse()
         assert stream.getheader("Content-Type") == "text/event-stream"
@@ -136,7 +136,7 @@ def test_an_index_follows_runs_that_come(tmp_path: Path) -> None:
         page = ask(server, "/")[1]
         assert "No run lies in this folder yet" in page
         follow = page.partition('data-follow="')[2].partition('"')[0]
-        connection = http.client.HTTPConnection(*server.server_address[:2], timeout=120)
+        connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=120)
         connection.request("GET", follow)
         stream = connection.getresponse()
         write_record(folder / "one", records.empty_record())

@@ -102,10 +102,15 @@ def _shown(folder: Path, live: bool) -> Iterator[Callable[[], None]]:
 
         def stay() -> None:
             print(f"the page stays at {address} until Ctrl-C", file=sys.stderr, flush=True)
-            with suppress(KeyboardInterrupt):
-                threading.Event().wait()
+            _until_stopped()
 
         yield stay
+
+
+def _until_stopped() -> None:
+    """Wait for Ctrl-C."""
+    with suppress(KeyboardInterrupt):
+        threading.Event().wait()
 
 
 def _code(record: EpisodeRecord) -> int:

@@ -240,6 +240,7 @@ class _Handler(PageHandler):
         self.send_response(HTTPStatus.OK)
         self.headers_of(None)
         self.send_header("Content-Type", "text/event-stream")
+        self.send_header("Connection", "close")
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
         self._tell("retry: 1000\n\n")
