@@ -14,6 +14,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from forestall.types.drawing import drawn_by as _drawn_by
+
 if TYPE_CHECKING:
     from forestall.assembly.monitor import Monitor as Monitor
     from forestall.conclusion import MonitorConfig as MonitorConfig
@@ -63,6 +65,8 @@ if TYPE_CHECKING:
     from forestall.types.verdict import Verdict as Verdict
 
 __version__ = "0.1.0"
+
+_drawn_by("forestall.report.notebook")  # graphs, verdicts, diagnoses and records in notebooks
 
 _PUBLIC = {
     "Box": "types.graph",

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -7,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from forestall.report.page import page_html, write_page
-from forestall.report.page_view import duration
+from forestall.report.page import MOST_BYTES, page_html, write_page
+from forestall.report.story import story
+from forestall.report.words import duration
 from forestall.types.episode import EpisodeRecord
 
 from . import records
@@ -211,15 +213,6 @@ def test_learned_states_are_named_as_such() -> None:
     assert "oracle" not in text
 
 
-def test_twenty_boundaries_of_noise_stay_under_three_megabytes() -> None:
-    record = records.potato_record(width=640, height=480, frames=2)
-    (first, *rest) = record.boundaries
-    many = tuple(replace(b, index=i) for i, b in enumerate((first, *rest, *rest[:6])))
-    assert len(many) == 20
-    size = len(page_html(replace(record, boundaries=many)).encode())
-    assert size < 3_000_000
-
-
 def test_the_file_is_written_whole(tmp_path: Path) -> None:
     path = write_page(records.potato_record(), tmp_path / "deep" / "page.html")
     assert path.read_text("utf-8") == page_html(records.potato_record())
@@ -246,3 +239,44 @@ def test_moments_after_a_subtask_and_at_the_end_are_said_so() -> None:
     assert "next: put_in(Plate, Microwave)" in found.text
     assert "0.734 of 0.900: replan" in found.text
     assert "Before each subtask" in page(records.potato_record()).text
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_every_drawing_and_region_has_a_name_of_its_own(make: object) -> None:
+    found = page(make())  # type: ignore[operator]
+    drawings = [a["aria-label"] for a in found.having("svg", "fg")]
+    regions = [a["aria-label"] for t, a in found.tags if t == "div" and "aria-label" in a]
+    assert len(drawings) == len(set(drawings)) and len(regions) == len(set(regions))
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_no_level_of_headings_is_left_out(make: object) -> None:
+    levels = [int(t[1]) for t, _ in page(make()).tags if re.fullmatch("h[1-6]", t)]  # type: ignore[operator]
+    assert levels[0] == 1
+    assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
+
+
+def test_a_story_stands_on_top() -> None:
+    assert story(records.potato_record()) in page(records.potato_record()).text
+
+
+def test_what_an_alarm_speaks_about_is_framed_in_the_picture() -> None:
+    found = page(records.potato_record(width=640, height=480))
+    culprits = [a["data-node"] for a in found.having("span", "culprit")]
+    assert culprits == ["Bowl-1"]
+    placed = [a for t, a in found.tags if t == "g" and "fg-placed" in a.get("class", "")]
+    frames = {a["data-node"] for a in found.having("span", "box")}
+    assert placed and {a["data-node"] for a in placed} <= frames
+    assert all(a["tabindex"] == "0" and a["aria-label"] for a in placed)
+
+
+def test_a_page_stays_under_two_megabytes_whatever_its_pictures_are() -> None:
+    record = records.potato_record(width=640, height=480, frames=3)
+    (first, *rest) = record.boundaries
+    many = tuple(replace(b, index=i) for i, b in enumerate((first, *rest, *rest, *rest)))
+    assert len(page_html(replace(record, boundaries=many)).encode()) <= MOST_BYTES
+
+
+def test_a_served_page_leads_home() -> None:
+    served = Page(page_html(records.potato_record(), home="/"))
+    assert "/" in served.links and "/" not in page(records.potato_record()).links

@@ -26,6 +26,7 @@ from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
 from forestall.cli.run import run
 from forestall.cli.study import study
+from forestall.cli.view import view
 from forestall.errors import InputError
 
 app = App(
@@ -34,7 +35,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
+for command in (run, view, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
 app.command(import_, name="import")
 app.command(demos)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,6 +35,7 @@ def run(
     parts: RunFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
+    live: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Run one task from pixels to a plan that works, and write a page about it.
 
@@ -44,6 +48,7 @@ def run(
         parts: which parts.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
+        live: show the run in a browser while it happens, and its page until Ctrl-C.
     """
     from forestall.assembly.configuration import run_config
     from forestall.assembly.make import needs_memory, prepare, run_episode
@@ -64,20 +69,48 @@ def run(
     folder = out or _new_folder(prepared.loaded.task.name, name, strategy, config.seed)
     make_folder(folder)
     page = folder / "index.html"
-    with alone(folder):
-        demonstrations, used = memory_of(config, quiet) if needs_memory(config) else (None, None)
-        recorder = RunRecorder(folder, page=str(page))
-        with ProgressLine(quiet=quiet) as line:
-            record = run_episode(prepared, demonstrations, [recorder, line], used)
-        if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
-            write_record(folder, record, page=str(page))
-        write_page(record, page)
-        data = record_to_json(read_record(folder), page=str(page))
-    if as_json:
-        print(json.dumps(data, indent=2))
-    else:
-        _summary(data)
+    with _shown(folder, live) as stay:
+        with alone(folder):
+            demonstrations, used = (
+                memory_of(config, quiet) if needs_memory(config) else (None, None)
+            )
+            recorder = RunRecorder(folder, page=str(page))
+            with ProgressLine(quiet=quiet) as line:
+                record = run_episode(prepared, demonstrations, [recorder, line], used)
+            if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
+                write_record(folder, record, page=str(page))
+            write_page(record, page)
+            data = record_to_json(read_record(folder), page=str(page))
+        if as_json:
+            print(json.dumps(data, indent=2), flush=True)
+        else:
+            _summary(data)
+        stay()
     return _code(record)
+
+
+@contextmanager
+def _shown(folder: Path, live: bool) -> Iterator[Callable[[], None]]:
+    """Show a run in a browser while it happens; yields what waits until it was seen enough."""
+    if not live:
+        yield lambda: None
+        return
+    from forestall.cli.view import serving_run
+
+    with serving_run(folder) as address:
+        print(f"live: {address}", file=sys.stderr, flush=True)
+
+        def stay() -> None:
+            print(f"the page stays at {address} until Ctrl-C", file=sys.stderr, flush=True)
+            _until_stopped()
+
+        yield stay
+
+
+def _until_stopped() -> None:
+    """Wait for Ctrl-C."""
+    with suppress(KeyboardInterrupt):
+        threading.Event().wait()
 
 
 def _code(record: EpisodeRecord) -> int:

@@ -21,6 +21,7 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 
 import forestall
 from forestall.errors import FileFormatError, ForestallError, InputError
+from forestall.experiments import stored
 from forestall.experiments.stored import (
     PACKED,
     AnyAbout,
@@ -37,8 +38,7 @@ from forestall.reading.models import validated
 from forestall.statistics.rows import ROW_FORMAT, EpisodeRow, Setup
 
 EXPERIMENT = "experiment"
-ABOUT = "experiment.json"
-ROWS = "episodes.jsonl"
+ABOUT, ROWS = stored.ABOUT, stored.ROWS
 EFFORT = "effort.jsonl"
 
 R = TypeVar("R", bound="Row")

@@ -15,6 +15,10 @@ from forestall.errors import FileFormatError
 from forestall.reading.documents import parse_json
 from forestall.reading.files import read_packed_text, read_text
 
+ABOUT = "experiment.json"
+ROWS = "episodes.jsonl"
+"""Files of a folder of results: what it is, and a line for each finished piece of work."""
+
 MOST_ROWS_BYTES = 2**30
 """How large the file of rows may be: about 200,000 episodes."""
 

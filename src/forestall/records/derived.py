@@ -113,6 +113,7 @@ class PlanRow:
     before: Subtask | None
     after: Subtask | None
     status: SkillStatus | None = None  # of a step that was already done
+    seconds: float | None = None  # of the robot's clock that it took
 
 
 def is_alarm(boundary: BoundaryRecord) -> bool:
@@ -272,7 +273,10 @@ def plan_rows(
     done: Sequence[ExecutedRecord], before: Sequence[Subtask], after: Sequence[Subtask]
 ) -> tuple[PlanRow, ...]:
     """Plan before and plan after, line by line: what was done, kept, removed, inserted."""
-    rows = [PlanRow(RowKind.DONE, e.subtask, e.subtask, e.outcome.status) for e in done]
+    rows = [
+        PlanRow(RowKind.DONE, e.subtask, e.subtask, e.outcome.status, e.outcome.duration_s)
+        for e in done
+    ]
     left, right = [_key(s) for s in before], [_key(s) for s in after]
     matcher = difflib.SequenceMatcher(None, left, right, autojunk=False)
     for tag, a, b, c, d in matcher.get_opcodes():

@@ -7,16 +7,15 @@ every text. The same rows and summary give the same bytes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from forestall.files import replace_file
 from forestall.report.experiment_view import View, experiment_view
 from forestall.report.figure_style import colours_css, inline_svg
+from forestall.report.page import environment, template
 
 if TYPE_CHECKING:
     from forestall.statistics.rows import EpisodeRow
@@ -100,28 +99,24 @@ def write_experiment(
 
 
 def _page_html(view: View, tables: Sequence[ShownTable]) -> str:
-    environment = Environment(
-        loader=PackageLoader("forestall.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    folder = files("forestall.report").joinpath("templates")
-    style, own, script = (
-        folder.joinpath(name).read_text(encoding="utf-8")
-        for name in ("page.css", "experiment.css", "experiment.js")
-    )
     drawings = {
         f.name: Markup(inline_svg(f.svg, f.name, f.title))
         for f in view.figures
         if f.svg is not None
     }
-    return environment.get_template("experiment.html.jinja").render(
-        view=view,
-        tables=tables,
-        drawings=drawings,
-        style=Markup(style + own + colours_css()),
-        script=Markup(script),
+    return (
+        environment()
+        .get_template("experiment.html.jinja")
+        .render(
+            view=view,
+            tables=tables,
+            drawings=drawings,
+            style=Markup(template("page.css") + template("experiment.css") + colours_css()),
+            script=Markup(experiment_script()),
+        )
     )
+
+
+def experiment_script() -> str:
+    """The script that every page of an experiment carries; who serves one allows this alone."""
+    return template("experiment.js")

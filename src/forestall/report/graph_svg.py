@@ -7,7 +7,7 @@ above the tree, the subtask node above that, tied to nothing. The same input giv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from html import escape
 from importlib.resources import files
 from typing import Literal
@@ -44,6 +44,8 @@ def graph_svg(
     *,
     done: bool = False,
     standalone: bool = False,
+    about: str = "",
+    placed: Collection[str] = (),
 ) -> str:
     """Draw `graph` as SVG.
 
@@ -56,6 +58,8 @@ def graph_svg(
         drawn: which relations are drawn how.
         done: whether the subtask of the graphs is over; otherwise it comes next.
         standalone: carry namespace and style sheet along, for a file of its own.
+        about: what tells this drawing from the others on a page, for those who hear it.
+        placed: ids of nodes that a picture beside it shows: they can be pointed at.
 
     Returns:
         One `<svg>` element. Both sides of a pair come out with the same size and the same rows.
@@ -74,19 +78,27 @@ def graph_svg(
     mine = drawings[-1] if side == "expected" and right is not None else drawings[0]
     width = max(d.width for d in drawings)
     height = max(d.height for d in drawings)
-    return _element(mine, width, height, side, standalone)
+    words = f"{side} scene graph{f', {about}' if about else ''}"
+    return _element(mine, width, height, words, placed, standalone)
 
 
 def _element(
-    drawing: Drawing, width: float, height: float, side: SideName, standalone: bool
+    drawing: Drawing,
+    width: float,
+    height: float,
+    words: str,
+    placed: Collection[str],
+    standalone: bool,
 ) -> str:
     graph = drawing.me.graph
-    label = f"{side} scene graph: {len(graph.nodes)} nodes, {len(graph.relations)} relations"
+    label = f"{words}: {len(graph.nodes)} nodes, {len(graph.relations)} relations"
+    role = "group" if placed else "img"
     space = ' xmlns="http://www.w3.org/2000/svg"' if standalone else ""
     parts = [
         (
             f'<svg{space} class="fg" viewBox="0 0 {_n(width)} {_n(height)}" width="{_n(width)}" '
-            f'height="{_n(height)}" role="img" aria-label="{escape(label)}">'
+            f'height="{_n(height)}" role="{role}" '
+            f'aria-label="{escape(label)}">'
         )
     ]
     if standalone:
@@ -96,7 +108,7 @@ def _element(
     parts += [_ghost_edge(drawing, b) for b in drawing.ghosts if b.slot.depth]
     parts += [part for x in drawing.lanes for part in _lane_line(drawing, x)]
     parts += [_lane_label(drawing, x) for x in drawing.lanes]
-    parts += [_node(b) for _, b in sorted(drawing.boxes.items())]
+    parts += [_node(b, i if i in placed else "") for i, b in sorted(drawing.boxes.items())]
     parts += [_node(b) for b in drawing.ghosts]
     if drawing.note:
         parts.append(
@@ -137,7 +149,7 @@ def _tree_edge(drawing: Drawing, node_id: str) -> str:
         f'<g class="fg-edge{mark}"><title>{escape(str(relation))}</title>'
         f'<path d="M{_n(x)} {_n(top + 5)}V{_n(child.middle - 6)}q0 6 6 6H{_n(child.x)}"/>'
         f'<path class="fg-head" d="M{_n(x)} {_n(top)}l-4 7h8z"/>'
-        f'<text x="{_n(middle)}" y="{_n(child.middle - 4)}">{words}</text></g>'
+        f'<text x="{_n(middle)}" y="{_n(child.middle - 4)}">{escape(words)}</text></g>'
     )
 
 
@@ -204,17 +216,25 @@ def _lane_label(drawing: Drawing, lane: Lane) -> str:
     return (
         f'<g class="{_lane_class(drawing, lane)}"><rect class="fg-paper" x="{_n(x - width / 2)}" '
         f'y="{_n(y - 7)}" width="{_n(width)}" height="14"/>'
-        f'<text x="{_n(x)}" y="{_n(y + 3.5)}">{lane.label}</text></g>'
+        f'<text x="{_n(x)}" y="{_n(y + 3.5)}">{escape(lane.label)}</text></g>'
     )
 
 
-def _node(box: Box) -> str:
+def _node(box: Box, pointed: str = "") -> str:
+    """One box; `pointed` is the id that a picture beside it knows it by."""
     kind = f" fg-{box.kind}" if box.kind else ""
     changed = " fg-haschanged" if any(c.kind == "changed" for c in box.chips) else ""
     width = box.right - box.x
+    place = '">'
+    if pointed:
+        said = escape(box.hint)
+        place = (
+            f' fg-placed" tabindex="0" role="img" data-node="{escape(pointed)}" '
+            f'aria-label="{said}">'
+        )
     parts = [
         (
-            f'<g class="fg-node{kind}{changed}"><title>{escape(box.hint)}</title>'
+            f'<g class="fg-node{kind}{changed}{place}<title>{escape(box.hint)}</title>'
             f'<rect class="fg-box" x="{_n(box.x)}" y="{_n(box.y)}" width="{_n(width)}" '
             f'height="{_n(BOX)}" rx="7"/>'
             f'<text class="fg-name" x="{_n(box.x + 9)}" y="{_n(box.middle + 4.5)}">'

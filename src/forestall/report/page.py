@@ -6,6 +6,7 @@ escapes every text. The same record gives the same bytes.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -15,13 +16,66 @@ from markupsafe import Markup
 from forestall.files import replace_file
 from forestall.records.derived import in_words
 from forestall.report.graph_svg import graph_css
-from forestall.report.page_view import duration, page_view, status_sign
+from forestall.report.page_view import Page, page_view, status_sign
+from forestall.report.words import duration
 from forestall.types.episode import EpisodeRecord
 
+MOST_BYTES = 2_000_000
+"""How large a page may be; its pictures get worse before it gets larger."""
 
-def page_html(record: EpisodeRecord, folder: Path | None = None) -> str:
-    """The page of a run as text; `folder` is where the pictures of a record lie that was read."""
-    environment = Environment(
+_LEAST_PICTURES = 100_000
+
+
+def page_html(record: EpisodeRecord, folder: Path | None = None, *, home: str = "") -> str:
+    """The page of a run as text.
+
+    Args:
+        record: of the run.
+        folder: where the pictures of a record lie that was read.
+        home: a link to all runs, where somebody serves the page; a file has none.
+    """
+    page = page_view(record, folder, MOST_BYTES)
+    text = _rendered(page, home)
+    size = len(text.encode("utf-8"))
+    if size > MOST_BYTES:
+        room = MOST_BYTES - (size - _pictures_size(page))
+        text = _rendered(page_view(record, folder, max(_LEAST_PICTURES, room)), home)
+    return text
+
+
+def _pictures_size(page: Page) -> int:
+    shown = [p for c in page.cards for p in (c.picture, c.thumb, *c.views) if p is not None]
+    return sum(len(p.uri) for p in shown)
+
+
+def _rendered(page: Page, home: str) -> str:
+    return (
+        environment()
+        .get_template("page.html.jinja")
+        .render(
+            page=page,
+            record=page.record,
+            home=home,
+            style=Markup(template("page.css") + graph_css()),
+            script=Markup(page_script()),
+        )
+    )
+
+
+def page_script() -> str:
+    """The script that every page carries; whoever serves pages allows this one alone."""
+    return template("page.js")
+
+
+def template(name: str) -> str:
+    """The text of a style sheet or script that pages carry."""
+    return files("forestall.report").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+@cache
+def environment() -> Environment:
+    """The template engine of this package; it escapes every text."""
+    made = Environment(
         loader=PackageLoader("forestall.report"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -29,19 +83,11 @@ def page_html(record: EpisodeRecord, folder: Path | None = None) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["duration"] = duration
-    environment.filters["sign"] = status_sign
-    environment.filters["in_words"] = in_words
-    environment.filters["svg"] = Markup  # graph_svg escapes its own texts
-    templates = files("forestall.report").joinpath("templates")
-    style = templates.joinpath("page.css").read_text(encoding="utf-8")
-    script = templates.joinpath("page.js").read_text(encoding="utf-8")
-    return environment.get_template("page.html.jinja").render(
-        page=page_view(record, folder),
-        record=record,
-        style=Markup(style + graph_css()),
-        script=Markup(script),
-    )
+    made.filters["duration"] = duration
+    made.filters["sign"] = status_sign
+    made.filters["in_words"] = in_words
+    made.filters["svg"] = Markup  # graph_svg escapes its own texts
+    return made
 
 
 def write_page(record: EpisodeRecord, path: Path | str, folder: Path | None = None) -> Path:

@@ -30,13 +30,19 @@ from forestall.records.plain import plain
 from forestall.report.drawn import Drawn, drawn
 from forestall.report.exchange_view import ExchangeView, exchange_views
 from forestall.report.graph_svg import graph_svg
-from forestall.types.episode import EpisodeRecord, SkillStatus, StoredObservation
+from forestall.report.in_picture import Framed, framed
+from forestall.report.story import story
+from forestall.types.episode import (
+    BoundaryRecord,
+    EpisodeRecord,
+    SkillStatus,
+    StoredObservation,
+)
 from forestall.types.observation import Observation
 from forestall.types.runtime import When
 from forestall.types.verdict import Verdict
 
 PICTURE_WIDTH, VIEW_WIDTH, THUMB_WIDTH = 480, 232, 132
-_PICTURES_BYTES = 1_900_000
 _MAX_VIEWS = 3
 
 LOOKS: Mapping[Mark, tuple[str, str]] = {
@@ -70,6 +76,7 @@ class Card:
 
     number: int
     moment: Moment
+    about: str  # what tells it from all others
     look: str
     sign: str
     verb: str
@@ -77,6 +84,7 @@ class Card:
     picture: Picture | None
     views: tuple[Picture, ...]
     thumb: Picture | None
+    boxes: tuple[Framed, ...]
     bars: tuple[Bar, ...]
     threshold_percent: float
     observed_svg: str
@@ -95,6 +103,7 @@ class Page:
     record: EpisodeRecord
     cards: tuple[Card, ...]
     heading: str
+    story: str
     alarms: tuple[Alarm, ...]
     places: Mapping[int, int]  # position of a boundary → number of its card
     legend: tuple[tuple[str, str, str, int], ...]  # class, sign, words, how many
@@ -109,8 +118,14 @@ class Page:
     provenance: tuple[tuple[str, str], ...]
 
 
-def page_view(record: EpisodeRecord, folder: Path | None) -> Page:
-    """Everything that the template needs."""
+def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -> Page:
+    """Everything that the template needs.
+
+    Args:
+        record: of the run.
+        folder: where its pictures lie.
+        pictures_bytes: how large all pictures together may be.
+    """
     all_moments = moments(record)
     frames = sum(
         1 + 0.3 * min(_MAX_VIEWS, len(m.boundary.observation.frames) - 1)
@@ -118,7 +133,7 @@ def page_view(record: EpisodeRecord, folder: Path | None) -> Page:
         if m.boundary is not None and m.boundary.observation is not None
         if m.boundary.observation.frames
     )
-    budget = int(_PICTURES_BYTES / max(10.0, frames))
+    budget = int(pictures_bytes / max(10.0, frames))
     cards = tuple(_card(record, i, m, budget, folder) for i, m in enumerate(all_moments, 1))
     perception = provenance_of(record, "perception")
     states = str(perception.get("state_estimator") or "not recorded")
@@ -127,6 +142,7 @@ def page_view(record: EpisodeRecord, folder: Path | None) -> Page:
         record=record,
         cards=cards,
         heading=_heading(all_moments),
+        story=story(record),
         alarms=alarms(record),
         places={c.moment.position: c.number for c in cards if c.moment.position is not None},
         legend=_legend(all_moments),
@@ -166,7 +182,9 @@ def _card(
     observation = None if boundary is None else boundary.observation
     picture, views, thumb = _pictures(observation, budget, folder)
     bars, threshold = _bars(verdict)
-    observed, expected = _graphs(moment, drawn(record.task.domain))
+    boxes = () if boundary is None or picture is None else _boxes(boundary)
+    about = f"moment {number}, {in_words(moment.when)} {moment.subtask}"
+    observed, expected = _graphs(moment, about, drawn(record.task.domain), boxes)
     outcome = None if boundary is None else outcome_of(boundary)
     rows: tuple[PlanRow, ...] = ()
     if boundary is not None and moment.after is not None:
@@ -174,6 +192,7 @@ def _card(
     return Card(
         number=number,
         moment=moment,
+        about=about,
         look=look,
         sign=sign,
         verb=_verb(moment),
@@ -181,6 +200,7 @@ def _card(
         picture=picture,
         views=views,
         thumb=thumb,
+        boxes=boxes,
         bars=bars,
         threshold_percent=threshold,
         observed_svg=observed,
@@ -216,6 +236,17 @@ def _pictures(
     return picture, views, thumb
 
 
+def _boxes(boundary: BoundaryRecord) -> tuple[Framed, ...]:
+    """Frames of what the observed graph draws, and of what an alarm speaks about."""
+    seen, diagnosis = boundary.observation, boundary.diagnosis
+    if seen is None or not seen.frames:
+        return ()
+    culprits = () if diagnosis is None else diagnosis.culprits
+    shown = {n.id for n in boundary.scoped.nodes} | set(culprits)
+    found = framed(boundary.graph, seen.frames[-1], culprits)
+    return tuple(f for f in found if f.node in shown)
+
+
 def _bars(verdict: Verdict | None) -> tuple[tuple[Bar, ...], float]:
     if verdict is None or verdict.score is None:
         return (), 0.0
@@ -234,30 +265,23 @@ def _bars(verdict: Verdict | None) -> tuple[tuple[Bar, ...], float]:
     )
 
 
-def _graphs(moment: Moment, how: Drawn) -> tuple[str, str]:
+def _graphs(moment: Moment, about: str, how: Drawn, boxes: Sequence[Framed]) -> tuple[str, str]:
     boundary = moment.boundary
     if boundary is None:
         return "", ""
     verdict, done = boundary.verdict, moment.when is not When.BEFORE
+    seen, placed = boundary.scoped, {b.node for b in boxes}
     if verdict is None or verdict.nearest is None:
-        return graph_svg(boundary.scoped, None, (), (), "observed", how, done=done), ""
-    seen, wanted = boundary.scoped, verdict.nearest.graph
-    pairs, found = verdict.matches, verdict.discrepancies
+        return graph_svg(
+            seen, None, (), (), "observed", how, done=done, about=about, placed=placed
+        ), ""
+    wanted, pairs, found = verdict.nearest.graph, verdict.matches, verdict.discrepancies
     return (
-        graph_svg(seen, wanted, pairs, found, "observed", how, done=done),
-        graph_svg(wanted, seen, pairs, found, "expected", how, done=done),
+        graph_svg(
+            seen, wanted, pairs, found, "observed", how, done=done, about=about, placed=placed
+        ),
+        graph_svg(wanted, seen, pairs, found, "expected", how, done=done, about=about),
     )
-
-
-def duration(seconds: float) -> str:
-    """Seconds in words, with a unit that keeps it short."""
-    if seconds == 0:
-        return "0 s"
-    if abs(seconds) >= 100:
-        return f"{seconds:.0f} s"
-    if abs(seconds) >= 1:
-        return f"{seconds:.1f} s"
-    return f"{1000 * seconds:.0f} ms" if abs(seconds) >= 0.0095 else f"{1000 * seconds:.1f} ms"
 
 
 def status_sign(status: SkillStatus | None) -> str:

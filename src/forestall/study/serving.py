@@ -1,8 +1,8 @@
 """A study on the local network: HTTP with the standard library, nothing loaded from elsewhere.
 
-Called by the command line; calls `pages.py` and `answers.py`. One process serves a folder. A rater
-is known by a random token in a cookie, of which the folder keeps a digest alone; an answer is
-acknowledged when it is on the disk.
+Called by the command line; calls `pages.py`, `answers.py` and `forestall/serving.py`. One process
+serves a folder. A rater is known by a random token in a cookie, of which the folder keeps a digest
+alone; an answer is acknowledged when it is on the disk.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
-from forestall.errors import ForestallError, InputError
+from forestall.errors import ForestallError
 from forestall.files import alone
+from forestall.serving import PageHandler, PageServer, Refused
 from forestall.study.answers import (
     CHOICES,
     MOST_NAME,
@@ -48,20 +48,7 @@ COOKIE = "rater"
 MOST_BODY = 8192
 """Bytes of a form: a name of 300 characters, each of four bytes written as %XX, and the rest."""
 
-_TIMEOUT_S = 30.0
 _MOST_SECONDS = 86_400.0
-_POLICY = (
-    "default-src 'none'; img-src 'self' data:; style-src 'self'; script-src 'self'; "
-    "form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
-)
-
-
-class Refused(Exception):
-    """A request that is answered with a message."""
-
-    def __init__(self, status: HTTPStatus, text: str) -> None:
-        super().__init__(text)
-        self.status, self.text = status, text
 
 
 class Raters:
@@ -128,7 +115,7 @@ class Raters:
             return rater
 
 
-class StudyServer(ThreadingHTTPServer):
+class StudyServer(PageServer):
     """Serves one study.
 
     Args:
@@ -141,29 +128,12 @@ class StudyServer(ThreadingHTTPServer):
         InputError: nothing can listen there.
     """
 
-    daemon_threads = True
-    request_queue_size = 64
-
     def __init__(self, folder: Path, study: Study, host: str, port: int) -> None:
         self.folder, self.study = folder, study
         self.raters = Raters(folder, study)
         pictures = {p for i in study.items for p in (i.expected, i.actual)}
         self.pictures = {f"/{p}": folder / p for p in pictures}
-        try:
-            super().__init__((host, port), _Handler)
-        except (OSError, OverflowError) as error:
-            raise InputError(
-                f"nothing can listen on {host}:{port} ({error}): name another --port or --host"
-            ) from error
-
-    @property
-    def address(self) -> str:
-        """What to open in a browser."""
-        host, port = map(str, self.server_address[:2])
-        return f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{port}/"
-
-    def handle_error(self, request: object, client_address: object) -> None:
-        """A connection that broke off is nobody's fault."""
+        super().__init__(host, port, _Handler)
 
 
 @contextmanager
@@ -179,42 +149,30 @@ def serving(folder: Path, host: str = "127.0.0.1", port: int = 8765) -> Iterator
         yield server
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(PageHandler):
     """One request."""
 
     server: StudyServer
-    protocol_version = "HTTP/1.1"
-    server_version, sys_version = "forestall", ""
-    timeout = _TIMEOUT_S
 
     def do_GET(self) -> None:
-        self._answered(self._get)
+        self.answered(self._get)
 
     def do_POST(self) -> None:
-        self._answered(self._post)
+        self.answered(self._post)
 
-    def log_message(self, format: str, *args: object) -> None:
-        """Nothing is logged: requests hold tokens."""
+    def message(self, text: str) -> str:
+        return message_page("This did not work", text)
 
-    def _answered(self, respond: object) -> None:
-        assert callable(respond)
-        try:
-            respond()
-        except Refused as error:
-            self._page(message_page("This did not work", error.text), error.status)
-        except (ForestallError, OSError) as error:
-            if isinstance(error, ConnectionError | TimeoutError):
-                raise
-            text = "This could not be kept. Please tell whoever runs the study."
-            self._page(message_page("This did not work", text), HTTPStatus.INTERNAL_SERVER_ERROR)
+    def failed(self, error: ForestallError | OSError) -> str:
+        return "This could not be kept. Please tell whoever runs the study."
 
     def _get(self) -> None:
         url = urlsplit(self.path)
         path = url.path
         if path in self.server.pictures:
-            self._send(self.server.pictures[path].read_bytes(), "image/jpeg", keep=True)
+            self.send(self.server.pictures[path].read_bytes(), "image/jpeg", keep=True)
         elif path[1:] in ASSETS:
-            self._send(asset(path[1:]), f"{ASSETS[path[1:]]}; charset=utf-8")
+            self.send(asset(path[1:]), f"{ASSETS[path[1:]]}; charset=utf-8")
         elif path.startswith("/resume/"):
             token = path.removeprefix("/resume/")
             if self.server.raters.known(token) is None:
@@ -224,7 +182,7 @@ class _Handler(BaseHTTPRequestHandler):
             if self._rater() is not None:
                 self._go("/trial")
             else:
-                self._page(welcome_page(self.server.study))
+                self.page(welcome_page(self.server.study))
         elif path == "/trial":
             self._trial(parse_qs(url.query).get("n", [""])[0])
         else:
@@ -252,7 +210,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif len(name) > MOST_NAME:
             problem = f"A name has at most {MOST_NAME} characters; this one has {len(name)}."
         if problem:
-            self._page(welcome_page(self.server.study, problem), HTTPStatus.BAD_REQUEST)
+            self.page(welcome_page(self.server.study, problem), HTTPStatus.BAD_REQUEST)
             return
         self._go("/trial", self.server.raters.begin(name))
 
@@ -268,10 +226,10 @@ class _Handler(BaseHTTPRequestHandler):
         position = min(position, last)
         progress = Progress(position, len(trials), len(rater.answers), f"/resume/{self._token()}")
         if position == len(trials):
-            self._page(done_page(progress))
+            self.page(done_page(progress))
             return
         given = rater.answers.get(position)
-        self._page(trial_page(self.server.study, trials[position], progress, given))
+        self.page(trial_page(self.server.study, trials[position], progress, given))
 
     def _answer(self, form: Mapping[str, str]) -> None:
         rater = self._rater()
@@ -319,24 +277,9 @@ class _Handler(BaseHTTPRequestHandler):
     def _rater(self) -> Rater | None:
         return self.server.raters.known(self._token())
 
-    # --- responses -------------------------------------------------------------------------------
-
-    def _page(self, text: str, status: HTTPStatus = HTTPStatus.OK) -> None:
-        self._send(text.encode(), "text/html; charset=utf-8", status)
-
-    def _send(
-        self, data: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, keep: bool = False
-    ) -> None:
-        self.send_response(status)
-        self._headers(len(data))
-        self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "private, max-age=86400" if keep else "no-store")
-        self.end_headers()
-        self.wfile.write(data)
-
     def _go(self, place: str, token: str | None = None) -> None:
         self.send_response(HTTPStatus.SEE_OTHER)
-        self._headers(0)
+        self.headers_of(0)
         self.send_header("Location", place)
         if token is not None:
             age = 31_536_000 if token else 0
@@ -345,12 +288,6 @@ class _Handler(BaseHTTPRequestHandler):
                 f"{COOKIE}={token}; Path=/; HttpOnly; SameSite=Lax; Max-Age={age}",
             )
         self.end_headers()
-
-    def _headers(self, length: int) -> None:
-        self.send_header("Content-Length", str(length))
-        self.send_header("Content-Security-Policy", _POLICY)
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header("Referrer-Policy", "same-origin")
 
 
 def _digest(token: str) -> str:

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Any
 
 from forestall.types.decision import Outcome
+from forestall.types.drawing import html_of
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Plan, Subtask
@@ -171,3 +172,6 @@ class EpisodeRecord:
     provenance: tuple[tuple[str, Any], ...] = field(default=(), hash=False)
     trouble: Trouble | None = None
     notes: tuple[str, ...] = ()
+
+    def _repr_html_(self) -> str:
+        return html_of(self)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from forestall.errors import FileFormatError, InputError
 from forestall.reading.fields import Field
+from forestall.types.drawing import html_of
 from forestall.types.facts import GRIPPER
 from forestall.types.observation import Vec3
 from forestall.types.plan import Subtask
@@ -156,6 +157,9 @@ class SceneGraph:
         for h in self.hidden:
             if h not in ids:
                 raise InputError(f"hidden names {h!r}, which is not a node")
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     def get(self, node_id: str) -> ObjectNode | None:
         """The node with this id, or None."""

@@ -10,6 +10,7 @@ from numbers import Real
 
 from forestall.errors import InputError
 from forestall.types.demonstration import View
+from forestall.types.drawing import html_of
 from forestall.types.exchange import Exchange
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
@@ -203,6 +204,9 @@ class Verdict:
         if self.score is not None:
             _check_number("score", self.score)
 
+    def _repr_html_(self) -> str:
+        return html_of(self)
+
     @property
     def judged(self) -> bool:
         """Whether anything was compared or checked; without a reference nothing is."""
@@ -237,6 +241,9 @@ class Diagnosis:
     why: str = ""  # how the cause leads to a failure, where somebody says so
     advice: str = ""  # what to do about it, in words
     exchanges: tuple[Exchange, ...] = ()  # with a language model, in their order
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @property
     def found(self) -> bool:
