@@ -43,7 +43,8 @@ def test_every_control_of_the_index(tmp_path: Path, chromium: Any, where: str) -
             compare.click()
         assert page.get_by_role("heading", name="Two runs side by side").is_visible()
         assert_fits(page)
-        page.get_by_role("link", name="All runs").click()
+        with page.expect_navigation():  # its script is there, too
+            page.get_by_role("link", name="All runs").click()
         with page.expect_navigation():
             page.locator("#filter-task").select_option("heat-potato")
         page.locator("a[href='/run/good/']").click()
@@ -71,7 +72,7 @@ def test_a_run_is_followed_to_its_end(tmp_path: Path, chromium: Any, where: str)
         for boundary, context in records.calls(record)[: records.ALARM_INDEX + 1]:
             recorder.on_boundary(boundary, context)
         page.get_by_text(records.SENTENCE).wait_for()
-        assert page.get_by_alt_text("The newest picture").is_visible()
+        page.get_by_alt_text("The newest picture").wait_for()
         assert_fits(page)
         write_record(tmp_path / "run", record)
         page.locator("#timeline").wait_for()
