@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from forestall.cli.flags import SeeingFlags
 
 if TYPE_CHECKING:
+    from forestall.assembly.recorded import Opened
     from forestall.experiments.recorded import JudgedRun
     from forestall.types.recorded import ReadReport
 
@@ -24,21 +25,27 @@ MOST_TOLD = 12
 def import_(
     data_set: str,
     folder: Path,
-    out: Path,
+    out: Path | None = None,
     /,
     *,
+    layout: Path | None = None,
+    steps: Path | None = None,
+    dry_run: Annotated[bool, Parameter(negative="")] = False,
     parts: SeeingFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
     """Read recorded runs of others: good ones become demonstrations, failing ones labelled scenes.
 
-    Pickles are read as plain data, and nothing in them is run. See docs/robofail.md.
+    Pickles are read as plain data, and nothing in them is run. See docs/logs.md, docs/robofail.md.
 
     Args:
-        data_set: whose: robofail.
-        folder: where it is.
+        data_set: whose or of what kind: folder, lerobot, mcap, record, robofail.
+        folder: where it is; one file for mcap.
         out: a new folder for memory.db, failing.json, failing/ and report.json.
+        layout: a TOML file that says which topic or column is what (docs/logs.md).
+        steps: a CSV file that says when subtasks began: time_s, subtask, outcome, episode.
+        dry_run: only show what would be read; every picture is decoded, nothing is written.
         parts: what pictures are seen with; states are the data set's by default.
         as_json: print the report as JSON.
         quiet: no progress on standard error.
@@ -46,8 +53,13 @@ def import_(
     from forestall.assembly.recorded import FAILING, MEMORY, import_into, open_data, report_of
     from forestall.cli.listing import say
     from forestall.cli.progress import bar
+    from forestall.errors import InputError
 
-    opened = open_data(data_set, folder, parts.given())
+    opened = open_data(data_set, folder, parts.given(), {"layout": layout, "steps": steps})
+    if dry_run:
+        return _shown(opened, as_json, quiet)
+    if out is None:
+        raise InputError("say into which new folder, or --dry-run")
     with bar("reading", quiet=quiet or as_json) as feed:
         report = import_into(opened, out, feed)
     if as_json:
@@ -56,6 +68,34 @@ def import_(
     say(f"{len(report.good)} good runs in {out / MEMORY}")
     say(f"{len(report.failing)} failing runs in {out / FAILING}")
     _tell(report)
+    return 0
+
+
+def _shown(opened: Opened, as_json: bool, quiet: bool) -> int:
+    """What would be read of each run."""
+    from dataclasses import asdict
+
+    from forestall.assembly.recorded import outlines
+    from forestall.cli.listing import print_table, say
+    from forestall.cli.progress import bar
+
+    with bar("reading", quiet=quiet or as_json) as feed:
+        found = list(outlines(opened, feed))
+    if as_json:
+        print(json.dumps([asdict(outline) for outline in found], indent=2))
+        return 0
+    for one in found:
+        if one.why_not:
+            say(f"{one.name}: cannot be used: {one.why_not}")
+            continue
+        what = one.fails or "a good run, a demonstration"
+        say(f"{one.name}: {what}; task {one.task or 'not told'}; {one.looks} looks: {one.pictures}")
+        print_table(
+            ("step", "begins", "subtask", "ended"),
+            [(str(n), f"{s.time_s:.1f} s", s.subtask, s.ended) for n, s in enumerate(one.steps, 1)],
+        )
+        for note in one.left_out:
+            say(f"  left out: {note}")
     return 0
 
 
