@@ -6,9 +6,12 @@ change an episode: a log that fails is said in the record's notes.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from forestall.errors import InputError
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
@@ -68,12 +71,16 @@ class LogWriter(Protocol):
 class EpisodeLog:
     """Listener that writes all that a run sees and does (`seams.Listener`, `LookListener`).
 
+    What is written once wrongly is no log: after a failure nothing more is written, and the end
+    takes it away.
+
     Args:
         writer: of one run.
     """
 
     def __init__(self, writer: LogWriter) -> None:
         self._writer = writer
+        self._whole = True
         self.complete = False
         """Whether the log of a whole run is written."""
 
@@ -82,11 +89,13 @@ class EpisodeLog:
         task = record.task
         scene = f"{task.scene.room or task.domain}-{record.seed}"
         name = "-".join((task.name, record.scenario or "undisturbed", str(record.seed)))
-        self._writer.begin(Head(name, task.name, scene, task.goal.text, task.domain))
+        with self._wholly():
+            self._writer.begin(Head(name, task.name, scene, task.goal.text, task.domain))
 
     def on_look(self, observation: Observation) -> None:
         """The robot has looked."""
-        self._writer.look(observation)
+        with self._wholly():
+            self._writer.look(observation)
 
     def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged: what was seen is written already."""
@@ -94,9 +103,24 @@ class EpisodeLog:
     def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A subtask was executed."""
         outcome = executed.outcome
-        self._writer.executed(Executed(executed.subtask, outcome.status, outcome.reason))
+        with self._wholly():
+            self._writer.executed(Executed(executed.subtask, outcome.status, outcome.reason))
 
     def on_end(self, record: EpisodeRecord) -> None:
         """The episode is over."""
-        self._writer.finish(record.success, "; ".join(record.failures))
-        self.complete = True
+        with self._wholly():
+            self._writer.finish(record.success, "; ".join(record.failures))
+            self.complete = True
+
+    @contextmanager
+    def _wholly(self) -> Iterator[None]:
+        """Around each call of the writer.
+
+        Raises:
+            InputError: an earlier one failed.
+        """
+        if not self._whole:
+            raise InputError("the log broke off earlier")
+        self._whole = False
+        yield
+        self._whole = True
