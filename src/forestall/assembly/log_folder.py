@@ -193,7 +193,7 @@ def _looks(read: _Read, domain: Domain) -> Iterator[Look]:
         seen = None
         if moment.at_ns is not None:
             folder = inside(read.folder, next(folders) or "")
-            observation, states = read_observation(folder, domain, None, names)
+            observation, states = read_observation(folder, domain, None, names, numbered=False)
             seen = _with_states(observation, states)
         yield Look(seen, moment.before, moment.done, moment.succeeded)
 

@@ -91,7 +91,7 @@ class LeRobotData:
         """Whether the last row says that the episode succeeded, where any row says it."""
         if _SUCCESS not in self._meta.info.features:
             return "null"
-        last = [cells.get(_SUCCESS) for cells in looking.cells([_SUCCESS])][-1:]
+        last = [cells.get(_SUCCESS) for cells in looking.cells([_SUCCESS], 1024)][-1:]
         value = last[0][0] if last and isinstance(last[0], list) and last[0] else last[0]
         return "true" if value is True else "false"
 

@@ -40,6 +40,7 @@ from forestall.logs.lerobot_out import (
     STANDS,
     SUBTASK,
     TIME,
+    UNSEEN,
 )
 from forestall.logs.lerobot_video import depth_m, frames_at
 from forestall.logs.moments import Moment
@@ -70,7 +71,8 @@ OWN = Columns(
 """The columns of our own data sets."""
 
 _SMALL = ("frame_index", "timestamp", "task_index", "subtask_index", LOOK, TIME, EXECUTED)
-_BATCH = 4
+_FEW, _MANY = 4, 1024
+"""Rows in memory at once, with pictures and without."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +107,7 @@ class Looking:
         Raises:
             FileFormatError: none, too many, or columns that are missing or of another type.
         """
-        found = [self._row(n, cells) for n, cells in enumerate(self.cells(_SMALL))]
+        found = [self._row(n, cells) for n, cells in enumerate(self.cells(_SMALL, _MANY))]
         if not found:
             raise FileFormatError(f"{self.meta.data_file(self.episode)}: the episode has no rows")
         return found
@@ -145,9 +147,9 @@ class Looking:
                 if at + 1 < len(rows) and rows[at + 1].look == row.look:
                     continue
                 observation = _observation(row, cells, tuple(frames), where)
-            except FileFormatError:
-                raise
-            except (ForestallError, ValueError, TypeError) as error:
+            except (ForestallError, KeyError, ValueError, TypeError) as error:
+                if str(error).startswith(where):
+                    raise
                 raise FileFormatError(f"{where}: {error}") from error
             frames = []
             yield observation
@@ -165,7 +167,7 @@ class Looking:
         stamp_ns = look if look is not None else round(time_s * 1e9)
         return Row(number, stamp_ns, number if look is None else look, cells)
 
-    def cells(self, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    def cells(self, names: Sequence[str], at_once: int = _FEW) -> Iterator[dict[str, Any]]:
         """Some columns of the episode's rows, as far as there are such."""
         file = self.meta.data_file(self.episode)
         name = file.relative_to(self.meta.folder).as_posix()
@@ -174,25 +176,35 @@ class Looking:
             if "episode_index" not in there:
                 raise FileFormatError(f"{file}: the column 'episode_index' is missing")
             columns = ["episode_index", *(n for n in names if n in there)]
-            for batch in opened.iter_batches(_BATCH, columns=columns, use_threads=False):
+            index = self.episode.index
+            groups = [
+                g for g in range(opened.num_row_groups) if _may_have(opened.metadata, g, index)
+            ]
+            batches = opened.iter_batches(at_once, groups, columns=columns, use_threads=False)
+            for batch in batches:
                 for cells in batch.to_pylist():
-                    if cells["episode_index"] == self.episode.index:
+                    if cells["episode_index"] == index:
                         yield cells
 
     def _own_steps(self, rows: Sequence[Row]) -> Iterator[Step]:
         last_ns, done = 0, -1
         for row in rows:
-            if row.look == done:
-                continue
-            where = f"{self.meta.data_file(self.episode)}: row {row.number}: {EXECUTED}"
-            for said in told(row.cells[EXECUTED], where):
-                if not isinstance(said, dict):
-                    raise FileFormatError(f"{where}: not a list of subtasks")
-                subtask = self.layout.subtask(str(said.get("subtask")), where)
-                status, _ = status_of(str(said.get("status", "")), where)
-                if subtask is not None:
-                    yield Step(last_ns, subtask, status, str(said.get("reason", "")))
-            last_ns, done = row.stamp_ns, row.look
+            if row.look != done:
+                where = f"{self.meta.data_file(self.episode)}: row {row.number}: {EXECUTED}"
+                yield from self._told_steps(row.cells[EXECUTED], last_ns, where)
+                last_ns, done = row.stamp_ns, row.look
+        left = self.episode.about.get(UNSEEN, "[]")
+        yield from self._told_steps(left, last_ns, f"episode {self.episode.index}: {UNSEEN}")
+
+    def _told_steps(self, cell: Any, at_ns: int, where: str) -> Iterator[Step]:
+        said = told(cell, where)
+        if not isinstance(said, list) or not all(isinstance(one, dict) for one in said):
+            raise FileFormatError(f"{where}: not a list of subtasks")
+        for one in said:
+            subtask = self.layout.subtask(str(one.get("subtask")), where)
+            status, _ = status_of(str(one.get("status", "")), where)
+            if subtask is not None:
+                yield Step(at_ns, subtask, status, str(one.get("reason", "")))
 
     def _language(self, rows: Sequence[Row]) -> Iterator[tuple[int, str]]:
         """(time, text) of the subtasks in the column of language; every row has all of them."""
@@ -287,6 +299,17 @@ class Looking:
             if mask.any():
                 found.append(Detection(kind, mask, one.get("instance"), one.get("score", 1.0)))
         return tuple(found)
+
+
+def _may_have(about: Any, group: int, episode: int) -> bool:
+    """Whether a row group may have rows of an episode, by its statistics if it has some."""
+    columns = about.row_group(group)
+    for number in range(columns.num_columns):
+        column = columns.column(number)
+        if column.path_in_schema == "episode_index" and column.is_stats_set:
+            said = column.statistics
+            return not said.has_min_max or bool(said.min <= episode <= said.max)
+    return True
 
 
 def _names(camera: Columns) -> Iterator[str]:

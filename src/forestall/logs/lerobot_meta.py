@@ -123,11 +123,12 @@ class Meta:
         return self._path("video_path", template, key, chunk, file)
 
     def _path(self, what: str, template: str, key: str, chunk: int, file: int) -> Path:
-        said = {"video_key": key, "chunk_index": chunk, "file_index": file}
+        numbers = {"chunk_index": chunk, "file_index": file}
 
         def put(part: re.Match[str]) -> str:
-            value = said[part[1]]
-            return f"{value:0{part[2] or 1}d}" if isinstance(value, int) else value
+            if part[1] not in numbers:
+                return key
+            return f"{numbers[part[1]]:0{part[2] or 1}d}"
 
         name = _PART.sub(put, template)
         if "{" in name or "}" in name:

@@ -40,6 +40,9 @@ LANGUAGE, SUBTASK = "language_persistent", "subtask"
 ABOUT = "forestall"
 """Column of the episodes that says what a run was of."""
 
+UNSEEN = "executed after the last look"
+"""An entry of it."""
+
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
@@ -131,7 +134,7 @@ class LeRobotWriter:
                 writer.write_table(pa.Table.from_pylist(rows, schema=schema))
         (self._partial / _SPOOL).unlink()
         about = {**asdict(self._head), "success": json.dumps(success), "why": why}
-        self._meta(about)
+        self._meta({**about, UNSEEN: json.dumps(self._since)})
         self._partial.rename(self._path)
 
     def abandon(self) -> None:

@@ -44,7 +44,7 @@ def frames_at(
 
     if not file.is_file():
         raise FileFormatError(f"{file} is missing: the data set names it")
-    with decoding(file, "a video"), av.open(str(file)) as container:
+    with decoding(file, "a video"), av.open(str(file), format=_format(file)) as container:
         if not container.streams.video:
             raise FileFormatError(f"{file} has no video in it")
         stream = container.streams.video[0]
@@ -68,6 +68,17 @@ def frames_at(
                     f"{file} has no frame at {time_s:.3f} s: it ends before, or lacks some"
                 )
             yield frame.to_ndarray(format="gray12le" if depth else "rgb24")
+
+
+def _format(file: Path) -> str:
+    """MP4 or Matroska by its first bytes: of other formats some name further files to open."""
+    with file.open("rb") as opened:
+        head = opened.read(8)
+    if head[4:] == b"ftyp":
+        return "mp4"
+    if head[:4] == b"\x1a\x45\xdf\xa3":
+        return "matroska"
+    raise FileFormatError(f"{file} is no video in MP4 or Matroska")
 
 
 def depth_m(codes: Any, about: Mapping[str, Any], where: str) -> Depth:

@@ -20,6 +20,7 @@ from forestall.logs.mcap_file import McapFile
 from forestall.logs.mcap_in import Looking
 from forestall.logs.mcap_index import Index, index_of
 from forestall.logs.mcap_out import ABOUT
+from forestall.logs.moments import unseen
 from forestall.logs.needed import needed
 from forestall.types.recorded import Look, RecordedRun, Unread
 
@@ -96,6 +97,8 @@ def _lacks(looking: Looking) -> Iterator[str]:
             yield f"{camera.rgb}: no depth that is aligned to it, so that nothing is located"
         if not camera.masks and camera.detections is None:
             yield f"{camera.rgb}: no masks and no detections; name a segmenter to have some"
+    if not looking.whole:
+        yield from unseen(looking.stamps_ns, looking.steps, looking.index.layout)
 
 
 def _from_csv(rows: list[CsvStep], index: Index, where: str) -> list[Step]:

@@ -163,7 +163,8 @@ class McapFile:
         with decoding(self.path, f"a log: the definition of topic {told.topic}"):
             decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
         if decoder is not None:
-            return decoder
+            found: Callable[[bytes], Any] = decoder
+            return found
         how = "none" if schema is None else schema.encoding
         return (
             f"{self.path}: topic {told.topic} has messages in {channel.message_encoding!r} with a "
@@ -243,7 +244,7 @@ class McapFile:
                 raise ValueError(f"{len(data)} bytes instead of {chunk.uncompressed_size}")
             if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
                 raise ValueError("its checksum does not fit: it is damaged")
-            records = breakup_chunk(replace(chunk, compression="", data=data))
+            records: list[Any] = breakup_chunk(replace(chunk, compression="", data=data))
         self._last = (offset, records)
         return records
 

@@ -53,12 +53,16 @@ class Looking:
         """Whether the file says itself which pictures are one look."""
         return bool(self.index.looks)
 
+    @property
+    def stamps_ns(self) -> list[int]:
+        """When any camera took a picture."""
+        return sorted({n for c in self.cameras for n in self.index.series[c.rgb].logs_ns})
+
     def moments(self) -> list[Moment]:
         """Every look, with the subtasks between them."""
         if self.whole:
             return moments_of(sorted(self.index.looks), self.steps)
-        stamps = sorted({n for c in self.cameras for n in self.index.series[c.rgb].logs_ns})
-        return moments_of(chosen(stamps, self.steps, self.index.layout), self.steps)
+        return moments_of(chosen(self.stamps_ns, self.steps, self.index.layout), self.steps)
 
     def looks(self) -> Iterator[Look]:
         """Each look with its pictures.

@@ -7,7 +7,7 @@ one just before each subtask begins, one at the end, and, if wanted, some in bet
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from forestall.logs.layout import Layout, Step
@@ -48,6 +48,17 @@ def chosen(stamps_ns: Sequence[int], steps: Sequence[Step], layout: Layout) -> l
                 picked.add(stamp)
                 last = stamp
     return sorted(picked)
+
+
+def unseen(stamps_ns: Sequence[int], steps: Sequence[Step], layout: Layout) -> Iterator[str]:
+    """Which subtasks nothing shows as they begin, in words."""
+    for number, step in enumerate(steps, 1):
+        before = bisect_right(stamps_ns, step.begins_ns)
+        gap_s = (step.begins_ns - stamps_ns[max(0, before - 1)]) / 1e9 if len(stamps_ns) else 0
+        if gap_s > layout.stale_s:
+            yield f"step {number} begins {gap_s:.1f} s after the last picture before it"
+        elif gap_s < 0:
+            yield f"step {number} begins {-gap_s:.1f} s before the first picture"
 
 
 def moments_of(looks_ns: Sequence[int], steps: Sequence[Step]) -> list[Moment]:

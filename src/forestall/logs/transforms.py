@@ -77,7 +77,7 @@ class Transforms:
             InputError: numbers that are none, a frame with two parents, or too many samples.
         """
         child, parent = child.lstrip("/"), parent.lstrip("/")
-        values = np.array([*at_m, *turned])
+        values = np.array([*at_m, *turned], np.float64)
         norm = float(np.linalg.norm(values[3:]))
         if not np.isfinite(values).all() or not 0.5 < norm < 2:
             raise InputError(f"the transform of {child!r} in {parent!r} is not one")

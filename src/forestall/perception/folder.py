@@ -129,6 +129,8 @@ def read_observation(
     domain: Domain | None = None,
     gate: GateConfig | None = _GATE,
     names: Names | None = None,
+    *,
+    numbered: bool = True,
 ) -> tuple[Observation, Mapping[str, Mapping[str, str]]]:
     """Read a stored observation and the states that were written down with it.
 
@@ -137,6 +139,7 @@ def read_observation(
         domain: which categories and states there are; the household's by default.
         gate: what observations cannot be; None lets everything in.
         names: of the run that it is a part of, so that ids mean the same things all along.
+        numbered: whether things without an instance get one where there is one frame alone.
 
     Raises:
         FileFormatError: a file is missing or cannot be read as what it should be, or what it says
@@ -147,7 +150,7 @@ def read_observation(
     folder = Path(path)
     words = domain or shipped(DEFAULT_DOMAIN)
     document = _document(folder)
-    reading = _Reading(folder, document, words, names or Names(words))
+    reading = _Reading(folder, document, words, names or Names(words), numbered)
     frames = tuple(reading.frame(data, index) for index, data in enumerate(document.frames))
     with _located(folder, "gripper"):
         hand = reading.hand(document.gripper)
@@ -199,8 +202,11 @@ def _document(folder: Path) -> _Document:
 class _Reading:
     """One document being read: its names and states over all frames."""
 
-    def __init__(self, folder: Path, document: _Document, domain: Domain, names: Names) -> None:
+    def __init__(
+        self, folder: Path, document: _Document, domain: Domain, names: Names, numbered: bool
+    ) -> None:
         self._folder, self._document, self._domain = folder, document, domain
+        self._numbers = numbered and len(document.frames) == 1
         self._names = names
         self._numbered: set[str] = set()
         self.states = GivenStates()
@@ -268,11 +274,10 @@ class _Reading:
     ) -> tuple[Detection, ...]:
         found: list[Detection] = []
         used: set[int | str | None] = set()
-        alone = len(self._document.frames) == 1
         for number, given in enumerate(data.detections):
             where = f"{self._folder / OBSERVATION_FILE}: {place}.detections.{number}"
             try:
-                category, instance = self._named(given, alone)
+                category, instance = self._named(given)
                 if any(instance is not None and d.instance == instance for d in found):
                     raise InputError(f"instance {instance!r} occurs twice in this frame")
                 if given.states:
@@ -291,12 +296,12 @@ class _Reading:
             found.append(Detection(category, mask, instance, given.score))
         return tuple(found)
 
-    def _named(self, given: _Detection, alone: bool) -> tuple[str, str | None]:
+    def _named(self, given: _Detection) -> tuple[str, str | None]:
         """Category and instance of a detection, in the domain's words where it has them."""
         names = self._names
         category = names.words.category(given.category)
         if given.instance is None:
-            if not alone:
+            if not self._numbers:
                 return category, None
             name = names.free(category, self._numbered)
             self._numbered.add(name)
