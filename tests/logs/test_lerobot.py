@@ -337,6 +337,17 @@ def test_cells_that_are_not_what_they_should_be_are_told_with_their_row(
     assert "row 4 of the episode" in str(error.value)
 
 
+def test_a_row_group_that_would_not_fit_into_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(LeRobotWriter(tmp_path / "set"), run())
+    (found,) = LeRobotData(tmp_path / "set").runs(DOMAIN)
+    assert isinstance(found, RecordedRun)
+    monkeypatch.setattr("forestall.logs.lerobot_meta.MOST_READ_BYTES", 1500)
+    with pytest.raises(FileFormatError, match=r"row group 0 claims \d+ bytes in the columns"):
+        list(found.looks())
+
+
 def test_our_own_set_is_laid_out_as_the_format_says(tmp_path: Path) -> None:
     write(LeRobotWriter(tmp_path / "set"), run())
     info = json.loads((tmp_path / "set/meta/info.json").read_text())

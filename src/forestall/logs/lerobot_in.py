@@ -21,6 +21,7 @@ from forestall.logs.lerobot_meta import (
     MOST_ROWS,
     Episode,
     Meta,
+    groups_of,
     parquet,
     read_subtasks,
     told,
@@ -177,9 +178,8 @@ class Looking:
                 raise FileFormatError(f"{file}: the column 'episode_index' is missing")
             columns = ["episode_index", *(n for n in names if n in there)]
             index = self.episode.index
-            groups = [
-                g for g in range(opened.num_row_groups) if _may_have(opened.metadata, g, index)
-            ]
+            groups = groups_of(opened, columns, file)
+            groups = [g for g in groups if _may_have(opened.metadata, g, index)]
             batches = opened.iter_batches(at_once, groups, columns=columns, use_threads=False)
             for batch in batches:
                 for cells in batch.to_pylist():

@@ -7,7 +7,7 @@ src/lerobot/datasets/utils.py (paths, info.json) and dataset_metadata.py (episod
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +25,9 @@ MOST_EPISODES = 100_000
 MOST_ROWS = 1_000_000
 """Of one episode: nine hours at 30 pictures a second."""
 
-MOST_GROUP_BYTES = 4 * 2**30
-"""Of a row group unpacked; its pages are read one after the other."""
+MOST_READ_BYTES = 192 * 2**20
+"""Of the columns that are read of a row group, unpacked: a page may have all of it, and is in memory
+nearly four times while it is unpacked. LeRobot's own files have at most 100 MB by default."""
 
 MOST_CELL_BYTES = 256 * 2**20
 
@@ -176,7 +177,8 @@ def read_episodes(meta: Meta, wanted: Sequence[int] | None = None) -> Iterator[E
         name = file.relative_to(meta.folder).as_posix()
         with parquet(meta.folder, name) as opened:
             columns = [c for c in opened.schema_arrow.names if not c.startswith("stats/")]
-            for batch in opened.iter_batches(batch_size=256, columns=columns):
+            groups = groups_of(opened, columns, file)
+            for batch in opened.iter_batches(256, groups, columns=columns):
                 for row in batch.to_pylist():
                     count += 1
                     if count > MOST_EPISODES:
@@ -203,7 +205,7 @@ def parquet(folder: Path, name: str) -> Iterator[Any]:
     """A parquet file of a data set, open.
 
     Raises:
-        FileFormatError: no such file in the folder, damaged, or a row group that claims too much.
+        FileFormatError: no such file in the folder, or a damaged one.
     """
     import pyarrow.parquet as pq
 
@@ -219,15 +221,29 @@ def parquet(folder: Path, name: str) -> Iterator[Any]:
             thrift_container_size_limit=2**20,
         ) as opened,
     ):
-        about = opened.metadata
-        for group in range(about.num_row_groups):
-            claimed = about.row_group(group).total_byte_size
-            if not 0 <= claimed <= MOST_GROUP_BYTES:
-                raise FileFormatError(
-                    f"{file}: row group {group} claims {claimed} bytes; at most "
-                    f"{MOST_GROUP_BYTES} are read"
-                )
         yield opened
+
+
+def groups_of(opened: Any, columns: Collection[str], file: Path) -> list[int]:
+    """The row groups of a file, whose columns may be read.
+
+    Raises:
+        FileFormatError: in one of them the columns claim more than `MOST_READ_BYTES`.
+    """
+    about = opened.metadata
+    for group in range(about.num_row_groups):
+        claimed = 0
+        for number in range(about.num_columns):
+            column = about.row_group(group).column(number)
+            name = column.path_in_schema
+            if any(name == c or name.startswith(f"{c}.") for c in columns):
+                claimed += max(0, column.total_uncompressed_size)
+        if claimed > MOST_READ_BYTES:
+            raise FileFormatError(
+                f"{file}: row group {group} claims {claimed} bytes in the columns "
+                f"{', '.join(columns)}; at most {MOST_READ_BYTES} are read: write smaller row groups"
+            )
+    return list(range(about.num_row_groups))
 
 
 def _texts(folder: Path, name: str, what: str) -> dict[int, str]:
@@ -235,6 +251,7 @@ def _texts(folder: Path, name: str, what: str) -> dict[int, str]:
     with parquet(folder, name) as opened:
         if opened.metadata.num_rows > MOST_EPISODES:
             raise FileFormatError(f"{folder / name}: more than {MOST_EPISODES} rows")
+        groups_of(opened, opened.schema_arrow.names, folder / name)
         table = opened.read()
     column = next((c for c in (what, "__index_level_0__") if c in table.column_names), None)
     if column is None or f"{what}_index" not in table.column_names:
