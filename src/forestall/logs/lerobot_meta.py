@@ -26,8 +26,8 @@ MOST_ROWS = 1_000_000
 """Of one episode: nine hours at 30 pictures a second."""
 
 MOST_READ_BYTES = 192 * 2**20
-"""Of the columns that are read of a row group, unpacked: a page may have all of it, and is in memory
-nearly four times while it is unpacked. LeRobot's own files have at most 100 MB by default."""
+"""Of the columns that are read of a row group, unpacked: a page may have all of it, and is nearly
+four times in memory while it is unpacked. LeRobot's own files have at most 100 MB by default."""
 
 MOST_CELL_BYTES = 256 * 2**20
 
@@ -241,7 +241,7 @@ def groups_of(opened: Any, columns: Collection[str], file: Path) -> list[int]:
         if claimed > MOST_READ_BYTES:
             raise FileFormatError(
                 f"{file}: row group {group} claims {claimed} bytes in the columns "
-                f"{', '.join(columns)}; at most {MOST_READ_BYTES} are read: write smaller row groups"
+                f"{', '.join(columns)}; at most {MOST_READ_BYTES} are read: write smaller groups"
             )
     return list(range(about.num_row_groups))
 
