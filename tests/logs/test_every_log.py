@@ -2,6 +2,7 @@
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,7 +65,7 @@ def same(one: Observation, two: Observation) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("how", [{}, {"overlapping": True}, {"overlapping": True, "named": False}])
-def test_all_of_a_run_comes_back(kind: str, how: dict[str, bool], tmp_path: Path) -> None:
+def test_all_of_a_run_comes_back(kind: str, how: dict[str, Any], tmp_path: Path) -> None:
     told = run(**how)
     found = kept(kind, tmp_path, told)
     assert isinstance(found, RecordedRun)

@@ -62,7 +62,7 @@ def replay(
         if memory_path(config) is None:
             raise InputError("give --memory FILE, or --strategy plan-check, which needs none")
         demonstrations, memory = memory_of(config, as_json)
-    found = []
+    found: list[Replayed] = []
     for one in runs_of(opened, run):
         if page is not None and found:
             raise InputError("--page is of one run: name it with --run")

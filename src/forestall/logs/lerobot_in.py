@@ -58,6 +58,7 @@ from forestall.types.observation import (
     Intrinsics,
     Observation,
     Pose,
+    Vec3,
 )
 from forestall.types.recorded import Look
 
@@ -326,7 +327,7 @@ def _observation(
 ) -> Observation:
     time_s = row.cells.get(TIME) if LOOK in row.cells else row.stamp_ns / 1e9
     hands: tuple[GripperState, ...] = (GripperState.untold(),)
-    named = ()
+    named: tuple[tuple[str, Vec3], ...] = ()
     if HANDS in cells:
         said = {"hands": told(cells[HANDS], HANDS), "named": told(cells.get(NAMED, "[]"), NAMED)}
         given = validated(Hands, said, where)

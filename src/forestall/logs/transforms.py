@@ -113,15 +113,15 @@ class Transforms:
         pose, at = np.eye(4), frame.lstrip("/")
         seen = [at]
         while at != world.lstrip("/"):
-            link = self._links.get(at)
-            if link is None or len(seen) > len(self._links):
+            found = self._links.get(at)
+            if found is None or len(seen) > len(self._links):
                 known = ", ".join(sorted({*self._links})[:12]) or "none"
                 raise InputError(
                     f"frame {frame!r} is not under {world!r} but ends at {at!r}; frames with a "
                     f"parent: {known}"
                 )
-            pose = link.at(stamp_ns) @ pose
-            at = link.parent
+            pose = found.at(stamp_ns) @ pose
+            at = found.parent
             seen.append(at)
         return pose
 
@@ -136,7 +136,10 @@ def _between(
     if share == 0 or cosine > 1 - 1e-12:
         return one
     angle = float(np.arccos(min(1.0, cosine)))
-    return (np.sin((1 - share) * angle) * one + np.sin(share * angle) * two) / np.sin(angle)
+    mixed: npt.NDArray[np.float64] = (
+        np.sin((1 - share) * angle) * one + np.sin(share * angle) * two
+    ) / np.sin(angle)
+    return mixed
 
 
 def _matrix(at_m: npt.NDArray[np.float64], turned: npt.NDArray[np.float64]) -> Pose:
