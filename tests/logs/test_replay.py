@@ -146,3 +146,17 @@ def test_a_log_that_cannot_be_kept_does_not_stop_the_run(tmp_path: Path) -> None
     assert not (tmp_path / "log").exists()
     assert list(tmp_path.glob(".*")) == []
     assert all(e.outcome.status is SkillStatus.SUCCEEDED for e in record.executed)
+
+
+def test_the_command_says_which_logs_there_are_and_when_one_broke_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["run", "fasten-plate", "--world", "symbolic", "--perceiver.name", "given-graph"]
+    command += ["--strategy", "none", "--seed", "3", "--out", str(tmp_path / "run"), "--quiet"]
+    assert call([*command, "--log", "mcap"]) == 2
+    assert "what kind of log and where, one of folder:PATH" in capsys.readouterr().err
+    assert call([*command, "--log", f"mcpa:{tmp_path / 'log'}"]) == 2
+    assert "unknown log 'mcpa'" in capsys.readouterr().err
+    assert call([*command, "--log", f"folder:{tmp_path / 'log'}"]) == 0
+    assert "EpisodeLog failed in on_look" in capsys.readouterr().err
+    assert not (tmp_path / "log").exists()
