@@ -10,7 +10,7 @@ import inspect
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +108,7 @@ class Opened:
     data: DataSet
     domain: Domain
     eyes: Eyes
-    given: Given
+    given: Given = field(default_factory=Given)
 
     def seen(self, report: ReadReport, progress: Progress = _silent) -> Iterator[SeenRun]:
         """Every run that can be used, one after the other.
