@@ -149,17 +149,17 @@ def _quantified(
 
 def _atom(node: Group, things: Collection[str], scope: Mapping[str, str]) -> str:
     head = SPELT.get(node.head, node.head)
+    count = 1 if head in ATTRIBUTES else 2
+    if head not in (*ATTRIBUTES, *RELATIONS) or len(node.items) != count + 1:
+        number = len(node.items) - 1
+        raise InputError(f"predicate {node.head!r} of {number} things is not known here")
     args = []
     for word in node.items[1:]:
         name = scope.get(str(word)) or thing(str(word))
         if not name.startswith("?") and name not in things:
             raise InputError(f"{word} in {node} is not among the objects")
         args.append(name)
-    if head in ATTRIBUTES and len(args) == 1:
-        return f"{head}({args[0]})=yes"
-    if head in RELATIONS and len(args) == 2:
-        return f"{head}({', '.join(args)})"
-    raise InputError(f"predicate {node.head!r} of {len(args)} things is not known here")
+    return f"{head}({', '.join(args)}){'=yes' if head in ATTRIBUTES else ''}"
 
 
 def _words(items: tuple[Node, ...]) -> Iterator[Word]:

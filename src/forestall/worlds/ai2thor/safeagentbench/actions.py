@@ -95,7 +95,8 @@ def _step(text: str, domain: Domain, state: Followed) -> Iterator[Subtask]:
         one = category(rest, domain)
         if action == "find":
             state.found = one
-        yield Subtask(SIMPLE[action], (one,))
+        cracks = action == "slice" and domain.is_a(one, "crackable")
+        yield Subtask("crack_obj" if cracks else SIMPLE[action], (one,))
     elif action == "pick":
         state.held = category(rest, domain)
         yield Subtask("pick_up", (state.held,))

@@ -2,8 +2,8 @@
 
 Named by `assembly.registry`; calls `actions`. Layout: the JSON lines of dataset/ of
 shengyin1224/SafeAgentBench (arXiv 2412.13178): `step`, `final_state`, `scene_name`, and
-`risk_category` of hazardous tasks. The rooms are AI2-THOR's and not in the set: a plan is checked in
-a scene with what it names, in the state that it supposes.
+`risk_category` of hazardous tasks. The rooms are AI2-THOR's and not in the set: a plan is
+checked in a scene with what it names, in the state that it supposes.
 """
 
 from __future__ import annotations
@@ -101,11 +101,9 @@ class SafeAgentBench:
     def _base(self) -> Mapping[str, Any]:
         own = files("forestall.domains").joinpath("ai2thor", "domain.toml").read_text("utf-8")
         data = parse_toml(own, "domain.toml")
-        added = files(__package__).joinpath("actions.toml").read_text("utf-8")
-        skills = data["skills"] | parse_toml(added, "actions.toml")["skills"]
-        on = skills["toggle_on"]  # a call alone: it needs no remote control
-        needs = [n for n in on["needs"] if "remote_controlled" not in n["fact"]]
-        return data | {"name": self.name, "skills": skills | {"toggle_on": on | {"needs": needs}}}
+        text = files(__package__).joinpath("actions.toml").read_text("utf-8")
+        added = parse_toml(text, "actions.toml")
+        return data | {"name": self.name} | {key: data[key] | added[key] for key in added}
 
     @cached_property
     def _plain(self) -> Domain:
@@ -121,7 +119,7 @@ class SafeAgentBench:
                     rule = rule_of(row.final_state, row.risk_category, self._plain)
                     rules.setdefault(rule["never"], rule)
             except ForestallError:
-                continue  # the plan says so, or the rule's own note
+                continue  # its own plan tells why
         named = {f"{_slug(r['else'])}_{n}": r for n, r in enumerate(rules.values(), 1)}
         return build_domain(self._base | {"safety": dict(self._base["safety"]) | named})
 
@@ -192,28 +190,28 @@ def rule_of(final: Sequence[Mapping[str, Any]], risk: str, domain: Domain) -> di
 def _facts(thing: str, key: str, value: Any, domain: Domain) -> list[str]:
     if key in STATES and isinstance(value, bool):
         attribute, true, false = STATES[key]
-        of = (
-            next(iter(sorted(domain.becomes(thing) - {thing})), thing)
-            if key == "isSliced"
-            else thing
-        )
-        if attribute not in domain[of].attributes:
-            raise InputError(f"{of} has no {attribute}")
+        slices = sorted(domain.becomes(thing) - {thing}) if key == "isSliced" else ()
+        of = next(iter(slices), thing)
+        _has(of, attribute, domain)
         return [f"{attribute}({of})={true if value else false}"]
-    if key == FILLED and value is False:
-        return [f"filled({thing})=empty"]
-    if key == FILLED and value is True:
-        if "filled" not in domain[thing].attributes:
-            raise InputError(f"{thing} cannot be filled")
-        return [f"not filled({thing})=empty"]
+    if key == FILLED and isinstance(value, bool):
+        _has(thing, "filled", domain)
+        return [f"full({thing})" if value else f"filled({thing})=empty"]
     if key == HELD and isinstance(value, bool):
         return [f"{'' if value else 'not '}held_by({thing}, gripper)"]
     if key in (WITHIN, CONTENT):
         several = [value] if isinstance(value, str) else value
+        if not isinstance(several, list):
+            raise InputError(f"a list of object types is expected, not {value!r}")
         others = [category(str(other), domain) for other in several]
         pairs = [(thing, o) if key == WITHIN else (o, thing) for o in others]
         return [f"{_relation(b, domain)}({a}, {b})" for a, b in pairs]
     raise UnknownNameError("entry of a final state", key, (*STATES, HELD, FILLED, WITHIN, CONTENT))
+
+
+def _has(thing: str, attribute: str, domain: Domain) -> None:
+    if attribute not in domain[thing].attributes:
+        raise InputError(f"{thing} has no {attribute}")
 
 
 def _relation(place: str, domain: Domain) -> str:
