@@ -54,6 +54,7 @@ TABLES: Mapping[str, Table] = {
             "kitchen",
             {
                 "ai2thor": "forestall.worlds.ai2thor.part:Thor",
+                "frankakitchen": "forestall.worlds.frankakitchen.part:FrankaKitchens",
                 "kitchen": "forestall.worlds.kitchen.part:Kitchens",
                 "symbolic": "forestall.testing.part:SymbolicWorlds",
             },
@@ -69,7 +70,10 @@ TABLES: Mapping[str, Table] = {
         Table(
             kinds.DOMAIN,
             "household",
-            {name: f"{_SEEING}:{name}" for name in ("ai2thor", "bench", "household")},
+            {
+                name: f"{_SEEING}:{name}"
+                for name in ("ai2thor", "bench", "frankakitchen", "household")
+            },
         ),
         Table(
             kinds.SEGMENTER,
