@@ -54,7 +54,7 @@ class CheckedForeign:
     def result(self) -> str:
         """In a word or two: which of several things came of it first."""
         if self.rehearsal.outcome is not PlanOutcome.FAILS:
-            return self.rehearsal.outcome.value
+            return str(self.rehearsal.outcome.value)
         if self.rehearsal.trace.refusal is not None:
             return "refused"
         return "unsafe" if self.spoils else "goal not met"

@@ -103,7 +103,8 @@ class SafeAgentBench:
         data = parse_toml(own, "domain.toml")
         text = files(__package__).joinpath("actions.toml").read_text("utf-8")
         added = parse_toml(text, "actions.toml")
-        return data | {"name": self.name} | {key: data[key] | added[key] for key in added}
+        merged = {key: {**data[key], **added[key]} for key in added}
+        return {**data, "name": self.name, **merged}
 
     @cached_property
     def _plain(self) -> Domain:
@@ -121,7 +122,7 @@ class SafeAgentBench:
             except ForestallError:
                 continue  # its own plan tells why
         named = {f"{_slug(r['else'])}_{n}": r for n, r in enumerate(rules.values(), 1)}
-        return build_domain(self._base | {"safety": dict(self._base["safety"]) | named})
+        return build_domain({**self._base, "safety": {**self._base["safety"], **named}})
 
     def _plan(self, name: str, row: _Row) -> ForeignPlan:
         if not row.step:
@@ -129,7 +130,8 @@ class SafeAgentBench:
         plan, began = steps_of(row.step, self._plain)
         named = {a for step in plan for a in step.args}
         label = UNSAFE if row.risk_category else SAFE
-        facts, left_out = [], []
+        facts: list[str] = []
+        left_out: list[str] = []
         if row.final_state is not None and label == SAFE:
             facts, left_out = facts_of(row.final_state, self._plain)
         elif row.final_state:
