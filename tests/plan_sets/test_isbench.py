@@ -155,6 +155,30 @@ def test_files_that_are_none(tmp_path: Path) -> None:
             Tasks(path)
 
 
+def test_a_task_cannot_name_a_start_elsewhere(tmp_path: Path) -> None:
+    file = write(tmp_path / "data")
+    text = file.read_text().replace('"task_name": "warm_soup"', '"task_name": "../../elsewhere"')
+    file.write_text(text)
+    (one,) = list(Tasks(file).plans())
+    assert isinstance(one, Unread) and "elsewhere" in one.why and "No such file" not in one.why
+
+
+def test_a_file_may_be_named_from_its_own_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(write(tmp_path / "data").parent)
+    for path in (Path("warm_soup.json"), Path()):
+        (one,) = list(Tasks(path).plans())
+        assert not isinstance(one, Unread), one
+
+
+def test_sentences_with_braces_stay_sentences(tmp_path: Path) -> None:
+    before = [{**BEFORE[1], "safety_tip": "Thaw {it} first."}]
+    at_end = [{**AT_END[1], "safety_tip": "No {pot} there {0}."}]
+    found = checked(tmp_path, plan=without("WAIT(soup.n.01_1)"), before=before, at_end=at_end)
+    assert found.spoils == ["Thaw (it) first."]
+
+
 def test_one_bad_task_does_not_keep_the_others(tmp_path: Path) -> None:
     write(tmp_path / "data", "first", plan=["JUGGLE(rag.n.01_1)"])
     write(tmp_path / "data", "second")

@@ -171,7 +171,7 @@ class Mechanism:
             self._mujoco.mj_step(self._model, self._data)
 
     def _count(self, seconds: float) -> int:
-        return round(seconds / self._model.opt.timestep)
+        return int(seconds / self._model.opt.timestep + 0.5)
 
     def _site(self, name: str) -> int:
         return int(self._model.site(name).id)

@@ -23,7 +23,7 @@ from forestall.domain.load import build_domain
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, ForestallError, InputError, UnknownNameError
 from forestall.reading.documents import parse_toml, read_json
-from forestall.reading.files import read_text
+from forestall.reading.files import inside, read_text
 from forestall.reading.models import validated
 from forestall.types.facts import category_of
 from forestall.types.foreign import ForeignPlan
@@ -116,6 +116,7 @@ class Tasks:
     name = "isbench"
 
     def __init__(self, path: Path) -> None:
+        path = path.absolute()  # the start states lie beside the folder of a task
         if path.is_dir():
             folder = path / "tasks" if (path / "tasks").is_dir() else path
             self._files = sorted(folder.glob("*.json"))
@@ -148,7 +149,7 @@ class Tasks:
     def _plan(self, file: Path) -> ForeignPlan:
         task = validated(_Task, read_json(file, "task of IS-Bench", _MOST_BYTES), str(file))
         name = task.task_info.task_name
-        problem = file.parent.parent / "bddl" / name / PROBLEM
+        problem = inside(file.parent.parent, f"bddl/{name}/{PROBLEM}")
         begin = start(read_text(problem, "start of the task", _MOST_BYTES), str(problem))
         abilities = _abilities(task.planning_context.object_abilities, begin)
         made = _conditions(task.evaluation_goal_conditions, begin.things)
@@ -223,7 +224,7 @@ def _conditions(said: _Conditions, things: tuple[str, ...]) -> _Made:
         label = f"at the end, {end.action or 'always'} ({end.risk_type})"
         if end.action is None or end.action.strip().lower() == COMPLETION:
             name = _named(end.risk_type, number)
-            tip = end.safety_tip or name
+            tip = _said(end.safety_tip) or name
             made.predicates |= _goal(made, name, end.safety_bddl, things, label, tip)
         else:
             rule = _rule(made, label, end.safety_bddl, end.safety_tip, things)
@@ -254,7 +255,7 @@ def _rule(
     except InputError as error:
         made.left_out.append(f"{label}: {error}")
         return None
-    return {"never": f"not ({formula})", "else": tip or label}
+    return {"never": f"not ({formula})", "else": _said(tip or label)}
 
 
 def _moment(made: _Made, label: str, action: str) -> str | None:
@@ -263,6 +264,11 @@ def _moment(made: _Made, label: str, action: str) -> str | None:
     except InputError as error:
         made.left_out.append(f"{label}: {error}")
         return None
+
+
+def _said(text: str) -> str:
+    """A sentence of the file's: braces would stand for a rule's variables."""
+    return text.replace("{", "(").replace("}", ")")
 
 
 def _named(risk: str, number: int) -> str:

@@ -185,7 +185,7 @@ def rule_of(final: Sequence[Mapping[str, Any]], risk: str, domain: Domain) -> di
         "never": formula,
         "every": [f"{v} - {c}" for c, v in variables.items()],
         "when": "leaving",
-        "else": risk.strip(),
+        "else": risk.strip().replace("{", "(").replace("}", ")"),
     }
 
 
