@@ -209,13 +209,15 @@ class Foreign(Protocol):
 
 
 class DataSet(Protocol):
-    """Runs that somebody else recorded, in a folder; made with the folder."""
+    """Runs that somebody else recorded, in a folder; made with the folder, and its own options."""
 
     name: str
     domain: str
     """The name of the domain in whose words its plans are."""
     options: Mapping[str, Mapping[str, Any]]
     """Kind of part → options that its pictures need."""
+    parts: Mapping[str, str]
+    """Kind of part → the part that they need, where it is not the one of stored scenes."""
 
     def __len__(self) -> int:
         """How many runs there may be."""
@@ -544,6 +546,14 @@ class Listener(Protocol):
 
     def on_end(self, record: EpisodeRecord) -> None:
         """The episode is over."""
+
+
+@runtime_checkable
+class LookListener(Protocol):
+    """A listener that is told of every look, too, beside `Listener`: a log of what was seen."""
+
+    def on_look(self, observation: Observation) -> None:
+        """The robot has looked; nothing is believed of it yet."""
 
 
 class GoalChecker(Protocol):

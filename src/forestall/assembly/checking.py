@@ -40,6 +40,8 @@ from forestall.types.episode import (
     SkillStatus,
 )
 from forestall.types.facts import category_of, is_instance
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
@@ -155,7 +157,7 @@ def judge_stored(
     lent = {"states": stated, "task": task.name}
     parts = Assembly(choices, domain, demonstrations, lent)
     bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
-    strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)
+    strategy, perceiver = strategy_of(parts, len(scenes)), parts.part(PERCEIVER)
     monitor = Monitor(strategy, domain, perceiver, bounds)
     monitor.start(task)
     found: list[Judgement] = []
@@ -163,7 +165,9 @@ def judge_stored(
     for stored in _read(scenes, domain, stated, learnt=bool(limits)):
         if found and wanted is None:
             passed.append(_passed(monitor, found[-1].record, stored))
-        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures, domain))
+        found.append(
+            judgement_of(stored.path, asked(monitor, stored.scene, wanted), pictures, domain)
+        )
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -251,7 +255,7 @@ def _task(
     return task, domain, limits
 
 
-def _strategy(parts: Assembly, scenes: int) -> Strategy:
+def strategy_of(parts: Assembly, scenes: int) -> Strategy:
     """The strategy that was chosen; as no repair is tried, it gives none up."""
     name = parts.name(STRATEGY)
     options: dict[str, Any] = {}
@@ -268,16 +272,18 @@ def _passed(monitor: Monitor, last: BoundaryRecord, following: Stored) -> Execut
     return ExecutedRecord(last.subtask, done, last.index)
 
 
-def _asked(monitor: Monitor, stored: Stored, wanted: Subtask | None) -> MonitorDecision:
+def asked(
+    monitor: Monitor, scene: Observation | SceneGraph, wanted: Subtask | None
+) -> MonitorDecision:
     """What the monitor says of a scene.
 
     Nobody looks here. Where an argument was not seen, "look" is the answer; a monitor that only
     wants to be sure is asked again with the same scene.
     """
-    decision = monitor.before(stored.scene, wanted)
+    decision = monitor.before(scene, wanted)
     if decision.outcome is not Outcome.LOOK or decision.context is None:
         return decision
-    return decision if unlocated(decision.context) else monitor.before(stored.scene, wanted)
+    return decision if unlocated(decision.context) else monitor.before(scene, wanted)
 
 
 def _meant(context: BoundaryContext, domain: Domain) -> str:
@@ -295,7 +301,9 @@ def _meant(context: BoundaryContext, domain: Domain) -> str:
     return text
 
 
-def _judgement(path: Path, decision: MonitorDecision, pictures: bool, domain: Domain) -> Judgement:
+def judgement_of(
+    path: Path, decision: MonitorDecision, pictures: bool, domain: Domain
+) -> Judgement:
     """What is kept of a decision; a plan that may not be adopted is one that is proposed."""
     record, replan, verdict = decision.record, decision.replan, decision.verdict
     assert record is not None, "what was looked at is recorded"

@@ -193,10 +193,22 @@ FOREIGN: Mapping[str, str] = {
 entry point, group "forestall.third-party"."""
 
 DATA_SETS: Mapping[str, str] = {
+    "folder": "forestall.assembly.log_folder:FolderRuns",
+    "lerobot": "forestall.logs.lerobot_data:LeRobotData",
+    "mcap": "forestall.logs.mcap_data:McapLogs",
+    "record": "forestall.assembly.log_record:Records",
     "robofail": "forestall.worlds.ai2thor.robofail.dataset:RoboFail",
 }
 """Recorded runs of others (`seams.DataSet`), each made with its folder: no part of a run. Others
 add theirs by entry point, group "forestall.data-set"."""
+
+LOGS: Mapping[str, str] = {
+    "folder": "forestall.assembly.log_folder:FolderWriter",
+    "lerobot": "forestall.logs.lerobot_out:LeRobotWriter",
+    "mcap": "forestall.logs.mcap_out:McapWriter",
+}
+"""What writes a run as it happens (`logs.writing.LogWriter`), each made with a path: no part of a
+run. Others add theirs by entry point, group "forestall.log"."""
 
 PLAN_SETS: Mapping[str, str] = {
     "isbench": "forestall.worlds.isbench.tasks:Tasks",
@@ -298,6 +310,16 @@ def data_set(name: str) -> Callable[..., Any]:
         InputError: it is known and cannot be imported.
     """
     return _of_others("data set", name, DATA_SETS, "data-set")
+
+
+def log(name: str) -> Callable[..., Any]:
+    """What writes a log, by its name.
+
+    Raises:
+        UnknownNameError: no such log.
+        InputError: it is known and cannot be imported.
+    """
+    return _of_others("log", name, LOGS, "log")
 
 
 def plan_set(name: str) -> Callable[..., Any] | None:

@@ -24,6 +24,7 @@ from forestall.cli.page import page
 from forestall.cli.parts import parts
 from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
+from forestall.cli.replay import replay
 from forestall.cli.run import run
 from forestall.cli.study import study
 from forestall.cli.view import view
@@ -38,6 +39,7 @@ app = App(
 for command in (run, view, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
 app.command(import_, name="import")
+app.command(replay)
 app.command(demos)
 app.command(domain)
 app.command(bench)

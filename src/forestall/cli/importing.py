@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from forestall.cli.flags import SeeingFlags
 
 if TYPE_CHECKING:
+    from forestall.assembly.recorded import Opened
     from forestall.experiments.recorded import JudgedRun
     from forestall.seams import PlanSet
     from forestall.types.recorded import ReadReport, Unread
@@ -26,9 +27,12 @@ MOST_TOLD = 12
 def import_(
     data_set: str,
     folder: Path,
-    out: Path,
+    out: Path | None = None,
     /,
     *,
+    layout: Path | None = None,
+    steps: Path | None = None,
+    dry_run: Annotated[bool, Parameter(negative="")] = False,
     parts: SeeingFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -36,14 +40,19 @@ def import_(
     """Read recorded runs of others, or plans of others.
 
     Of runs good ones become demonstrations, failing ones labelled scenes; pickles are read as plain
-    data, and nothing in them is run (docs/robofail.md). Plans go through the plan check, and
-    conditions around their steps become safety rules of a domain (docs/plans-of-others.md).
+    data, and nothing in them is run (docs/logs.md, docs/robofail.md). Plans go through the plan
+    check, and conditions around their steps become safety rules of a domain
+    (docs/plans-of-others.md).
 
     Args:
-        data_set: whose runs: robofail; whose plans: isbench, safeagentbench.
-        folder: where it is: a folder; of plans also one file.
+        data_set: whose runs or logs: folder, lerobot, mcap, record, robofail; whose plans: isbench,
+            safeagentbench.
+        folder: where it is: a folder; of mcap and of plans also one file.
         out: a new folder: for memory.db, failing.json, failing/ and report.json of runs, for
             plans/, domains/ and report.json of plans.
+        layout: of a log: a TOML file that says which topic or column is what (docs/logs.md).
+        steps: of a log: a CSV file: time_s, subtask and, if wanted, outcome and episode.
+        dry_run: of runs: show what would be read; all is decoded, nothing is written.
         parts: what pictures are seen with; states are the data set's by default.
         as_json: print the report as JSON.
         quiet: no progress on standard error.
@@ -52,13 +61,20 @@ def import_(
     from forestall.assembly.registry import imported_sets, plan_set
     from forestall.cli.listing import say
     from forestall.cli.progress import bar
-    from forestall.errors import UnknownNameError
+    from forestall.errors import InputError, UnknownNameError
 
-    if (plans := plan_set(data_set)) is not None:
-        return _plans(plans(folder), out, parts, as_json=as_json, quiet=quiet)
-    if data_set not in imported_sets():
+    plans = plan_set(data_set)
+    if plans is None and data_set not in imported_sets():
         raise UnknownNameError("data set", data_set, imported_sets())
-    opened = open_data(data_set, folder, parts.given())
+    how = {"layout": layout, "steps": steps}
+    if plans is not None:
+        if dry_run or layout is not None or steps is not None:
+            raise InputError(f"{data_set} has plans: --dry-run, --layout and --steps are of runs")
+        return _plans(plans(folder), _new(out), parts, as_json=as_json, quiet=quiet)
+    opened = open_data(data_set, folder, parts.given(), how)
+    if dry_run:
+        return _shown(opened, as_json, quiet)
+    out = _new(out)
     with bar("reading", quiet=quiet or as_json) as feed:
         report = import_into(opened, out, feed)
     if as_json:
@@ -68,6 +84,43 @@ def import_(
     say(f"{len(report.failing)} failing runs in {out / FAILING}")
     _tell(report)
     return 0
+
+
+def _shown(opened: Opened, as_json: bool, quiet: bool) -> int:
+    """What would be read of each run."""
+    from dataclasses import asdict
+
+    from forestall.assembly.recorded import outlines
+    from forestall.cli.listing import print_table, say
+    from forestall.cli.progress import bar
+
+    with bar("reading", quiet=quiet or as_json) as feed:
+        found = list(outlines(opened, feed))
+    if as_json:
+        print(json.dumps([asdict(outline) for outline in found], indent=2))
+        return 0
+    for one in found:
+        if one.why_not:
+            say(f"{one.name}: cannot be used: {one.why_not}")
+            continue
+        what = one.fails or "a good run, a demonstration"
+        say(f"{one.name}: {what}; task {one.task or 'not told'}; {one.looks} looks: {one.pictures}")
+        print_table(
+            ("step", "begins", "subtask", "ended"),
+            [(str(n), f"{s.time_s:.1f} s", s.subtask, s.ended) for n, s in enumerate(one.steps, 1)],
+        )
+        for note in one.left_out:
+            say(f"  left out: {note}")
+    return 0
+
+
+def _new(out: Path | None) -> Path:
+    """The folder that is written to."""
+    from forestall.errors import InputError
+
+    if out is None:
+        raise InputError("say into which new folder, or --dry-run")
+    return out
 
 
 def _plans(plans: PlanSet, out: Path, parts: SeeingFlags, *, as_json: bool, quiet: bool) -> int:

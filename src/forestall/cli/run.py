@@ -32,6 +32,7 @@ def run(
     seed: int | None = None,
     without: str | None = None,
     out: Path | None = None,
+    log: str | None = None,
     parts: RunFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
@@ -45,12 +46,15 @@ def run(
         seed: of the scene.
         without: a part to leave out: subtask-node, structure, nodes, edges, reasoning, validation.
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
+        log: keep all that is seen and done, too: mcap:FILE, lerobot:FOLDER or folder:FOLDER, for
+            `forestall import` and `forestall replay` (docs/logs.md).
         parts: which parts.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
         live: show the run in a browser while it happens, and its page until Ctrl-C.
     """
     from forestall.assembly.configuration import run_config
+    from forestall.assembly.logs import logging_to
     from forestall.assembly.make import needs_memory, prepare, run_episode
     from forestall.files import alone, make_folder
     from forestall.kinds import STRATEGY
@@ -62,7 +66,7 @@ def run(
     given, of_run = parts.read()
     flags = {"scenario": scenario, "seed": seed, "without": without}
     of_run |= {name: value for name, value in flags.items() if value is not None}
-    config = run_config(task, given=given, **of_run)
+    config = run_config(task, given=given, final_look=log is not None, **of_run)
     prepared = prepare(config)
     name = None if prepared.scenario is None else prepared.scenario.name
     strategy = config.choice(STRATEGY).name
@@ -75,8 +79,8 @@ def run(
                 memory_of(config, quiet) if needs_memory(config) else (None, None)
             )
             recorder = RunRecorder(folder, page=str(page))
-            with ProgressLine(quiet=quiet) as line:
-                record = run_episode(prepared, demonstrations, [recorder, line], used)
+            with logging_to(log) as logs, ProgressLine(quiet=quiet) as line:
+                record = run_episode(prepared, demonstrations, [recorder, line, *logs], used)
             if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
                 write_record(folder, record, page=str(page))
             write_page(record, page)
