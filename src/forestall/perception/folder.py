@@ -76,6 +76,7 @@ class _Detection(_Strict):
     id: int | None = Field(default=None, gt=0)
     mask: str | None = None
     score: float = Field(default=1.0, ge=0, le=1)
+    outlined: bool = True
     states: dict[str, str] = {}
 
 
@@ -266,7 +267,7 @@ class _Reading:
                 )
             used.add(source)
             mask = _mask(self._folder, given, how, masks, where, shape)
-            found.append(Detection(category, mask, instance, given.score))
+            found.append(Detection(category, mask, instance, given.score, given.outlined))
         return tuple(found)
 
     def _named(self, given: _Detection, alone: bool) -> tuple[str, str | None]:
@@ -369,9 +370,9 @@ def _write_frame(
         arrays: dict[str, Any] = {f"m{i}": d.mask for i, d in enumerate(frame.detections)}
         np.savez_compressed(folder / masks, **arrays)
         for key, d in zip(arrays, frame.detections, strict=True):
-            detections.append(
-                {"category": d.category, "instance": d.instance, "score": d.score, "mask": key}
-            )
+            told: dict[str, object] = {"category": d.category, "instance": d.instance}
+            told |= {"score": d.score, "mask": key}
+            detections.append(told if d.outlined else {**told, "outlined": False})
     elif frame.instance_ids is not None:
         masks = f"masks{tail}.png"
         Image.fromarray((frame.instance_ids + 1).astype(np.uint16)).save(folder / masks)
