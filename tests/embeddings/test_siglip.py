@@ -40,7 +40,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "num_attention_heads": 2,
     }
     config = transformers.SiglipConfig(
-        text_config={**tower, "vocab_size": 16, "max_position_embeddings": LENGTH},
+        text_config={
+            **tower,
+            "vocab_size": 16,
+            "bos_token_id": 1,
+            "eos_token_id": 2,
+            "max_position_embeddings": LENGTH,
+        },
         vision_config={**tower, "image_size": PIXELS, "patch_size": 8},
     )
     path = tmp_path_factory.mktemp("models") / "tiny-siglip"
@@ -82,7 +88,7 @@ def test_the_model_is_computed_as_transformers_does(folder: Path) -> None:
             **processor([shown(crop(rgb, m, PIXELS)) for m in masks], return_tensors="pt"),
         )
     logits = siglip.reading.scale * (siglip.encode_crops(rgb, masks) @ siglip.encode(texts).T)
-    logits += float(model.logit_bias)
+    logits += model.logit_bias.detach().numpy()
     assert siglip.reading.scale == pytest.approx(np.exp(2.0), rel=1e-5)
     assert np.allclose(logits, answer.logits_per_image.numpy(), atol=1e-4)
 
