@@ -109,7 +109,7 @@ def test_looks_of_one_run_keep_their_names(
     ("more", "code", "why"),
     [
         ((), 2, "has no masks: say what finds things in its pictures, for example --segmenter"),
-        ((*SHADES, "--segmenter.categories", "Potato"), 3, "found nothing of 1 phrases (potato"),
+        ((*SHADES, "--segmenter.categories", "Potato"), 2, "asked for (potato) in 1 picture"),
         ((*SHADES, "--segmenter.categories", "Mugg"), 2, "did you mean Mug"),
         (("--segmenter", "finder", "--finder.model", "gone/model/x"), 3, "neither a folder nor"),
         (("--segmenter", "finder", "--finder", "onnx"), 2, "needs the option model"),

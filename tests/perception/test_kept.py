@@ -124,7 +124,7 @@ def test_what_other_eyes_do_not_see_is_left_out(
     )
     with open_store(memory, create=True) as store:
         store.add(Demonstration("clear-up", "own", 0, (seen,)))
-    for words, why in (("counter,mug", "Plate-1 is not seen"), ("sofa", "found nothing of")):
+    for words, why in (("counter,mug", "Plate-1 is not seen"), ("sofa", "found none of")):
         flags = ["--segmenter", "finder", "--finder", "vision.shades:Shades", "--states", "given"]
         flags += ["--finder.words", words, "--segmenter.categories", "CounterTop, Mug"]
         assert call(["demos", "perceive", str(memory), str(tmp_path / f"{words}.db"), *flags]) == 0

@@ -14,6 +14,7 @@ import pytest
 
 from forestall.embeddings.siglip import SiglipEncoder
 from forestall.errors import InputError, ModelFileError
+from forestall.fingerprint import weights_of
 from forestall.vision.grounding_dino import GroundingDinoFinder
 from forestall.vision.owl import Owlv2Finder
 from forestall.vision.sam import SamOutliner
@@ -92,6 +93,13 @@ def test_missing_weights_name_the_download(model: Any, monkeypatch: pytest.Monke
     monkeypatch.setitem(sys.modules, "huggingface_hub", hub)
     with pytest.raises(ModelFileError, match=r"snapshot_download\('.*set FORESTALL_[A-Z0-9_]+ to"):
         model()
+
+
+def test_results_are_kept_apart_by_the_weights_that_a_variable_names(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("FORESTALL_GROUNDING_DINO", "/models/dino")
+    assert weights_of(["sam", "grounding-dino"]) == [("grounding-dino", "/models/dino")]
 
 
 @pytest.mark.parametrize("model", [GroundingDinoFinder, Owlv2Finder])

@@ -89,7 +89,8 @@ def test_boxes_scores_and_classes_are_those_of_the_model(tmp_path: Path) -> None
         [coloured(255, 0), coloured(0, 255), coloured(255, 153), coloured(0, 0)],
         ["cup", "dining table"],
     )
-    assert [(b.phrase, b.corners) for b in red] == [("cup", (32.0, 12.0, 48.0, 28.0))]
+    assert [b.phrase for b in red] == ["cup"]
+    assert red[0].corners == pytest.approx((32.0, 12.0, 48.0, 28.0), abs=1e-3)
     assert red[0].score == pytest.approx(1 / (1 + np.exp(-10)), abs=1e-4)
     assert [b.phrase for b in green] == ["dining table"]
     assert np.allclose(green[0].corners, (0.0, 5.0, 24.0, 15.0))  # cut off at the border
@@ -208,11 +209,15 @@ def test_an_export_of_a_real_class_gives_what_the_class_gives(tmp_path: Path, rg
     processor.save_pretrained(folder)
 
     class Heads(torch.nn.Module):  # type: ignore[name-defined, misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self.model = model
+
         def forward(self, pixels: Any) -> Any:
-            out = model(pixel_values=pixels)
+            out = self.model(pixel_values=pixels)
             return out.logits, out.pred_boxes
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), torch.no_grad():
         warnings.simplefilter("ignore")
         torch.onnx.export(
             Heads(),

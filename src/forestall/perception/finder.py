@@ -91,11 +91,12 @@ class FoundSegmenter:
         boxes = self._finder.find([f.rgb for f in frames], self.phrases)
         found = [self._outlined(f, b) for f, b in zip(frames, boxes, strict=True)]
         if not any(found):
+            more = f", ... {len(self.phrases)} in all" if len(self.phrases) > 4 else ""
+            several = "s" if len(frames) > 1 else ""
             raise PerceptionError(
-                f"the finder {self._finder.name!r} found nothing of {len(self.phrases)} phrases "
-                f"({', '.join(self.phrases[:4])}, ...) in {len(frames)} picture"
-                f"{'s' if len(frames) > 1 else ''}: ask for fewer (segmenter.categories), or take "
-                "less sure answers (finder.least_score)"
+                f"the finder {self._finder.name!r} found none of the things that it was asked for "
+                f"({', '.join(self.phrases[:4])}{more}) in {len(frames)} picture{several}: ask for "
+                "others (segmenter.categories), or take less sure answers (finder.least_score)"
             )
         return found
 

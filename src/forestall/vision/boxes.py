@@ -75,5 +75,4 @@ def batches(pictures: Sequence[Rgb], most: int) -> Iterator[list[int]]:
 def sigmoid(logits: Floats) -> Floats:
     """Elementwise, and 0 for what is minus infinity."""
     with np.errstate(over="ignore"):
-        shares: Floats = 1 / (1 + np.exp(-logits))
-    return shares
+        return np.asarray(1 / (1 + np.exp(-logits)), dtype=np.float32)

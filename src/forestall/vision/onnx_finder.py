@@ -140,7 +140,7 @@ class OnnxFinder:
         if how.do_rescale:
             values = values * np.float32(how.rescale_factor)
         if how.do_normalize:
-            mean, deviation = (np.float32(v) for v in (how.image_mean, how.image_std))
+            mean, deviation = (np.array(v, np.float32) for v in (how.image_mean, how.image_std))
             values = (values - mean) / deviation
         return np.ascontiguousarray(values.transpose(2, 0, 1), dtype=np.float32)
 
