@@ -61,13 +61,15 @@ def test_a_folder_of_pictures_becomes_masks_graph_overlay_and_verdict(
     mug = original.instance_ids == original.instance_names.index("Mug-1")
     both, either = found["Mug-1"].mask & mug, found["Mug-1"].mask | mug
     assert both.sum() > 0.6 * either.sum()
-    overlay = Image.open(seen / "overlay.png")
-    assert overlay.width > original.rgb.shape[1] and overlay.height >= original.rgb.shape[0]
+    with Image.open(seen / "overlay.png") as overlay:
+        assert overlay.width > original.rgb.shape[1] and overlay.height >= original.rgb.shape[0]
     assert json.loads((seen / "perception.json").read_text())["perception"]["segmenter"] == (
         "shades, outlined by depth"
     )
     assert call(["check", str(seen), *PICK_UP, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["outcome"] == "proceed"
+    at_once = ["--segmenter.name", "finder", "--finder.name", *SHADES[3:]]
+    assert call(["check", str(photo), *PICK_UP, *at_once]) == 0
 
 
 def test_own_masks_are_used_where_there_are_some(
