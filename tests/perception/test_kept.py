@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from forestall.cli.main import call
 from forestall.domain.load import shipped
 from forestall.errors import InputError, MemoryFileError
 from forestall.memory.store import open_store
+from forestall.perception.folder import write_observation
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.given_graph import GraphPassthrough
 from forestall.perception.perceiver import GraphPerceiver
@@ -81,7 +83,9 @@ def test_what_was_not_kept_or_has_changed_is_named(tmp_path: Path) -> None:
         kept.get("0" * 32, DOMAIN)
 
 
-def test_other_eyes_name_things_themselves_and_subtasks_follow(tmp_path: Path) -> None:
+def test_other_eyes_name_things_themselves_and_subtasks_follow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     memory, out = tmp_path / "m.db", tmp_path / "anew.db"
     kept = KeptObservations(memory)
     far = at("Plate-7", 0.5, 0.3, 0.9, (0.22, 0.22, 0.02), True)
@@ -103,6 +107,12 @@ def test_other_eyes_name_things_themselves_and_subtasks_follow(tmp_path: Path) -
     assert str(after.steps[0].subtask) == "pick_up(Plate-1)"
     assert "Plate-1" in {n.id for n in after.steps[0].graph.nodes}
     assert dict(after.perception)["segmenter"] == "shades, outlined by depth"
+    write_observation(tmp_path / "scene", scene)
+    asked = ["--subtask", "pick_up(Plate)", "--memory", str(out), "--json"]
+    call(["check", str(tmp_path / "scene"), *asked])
+    printed, told = capsys.readouterr()
+    other = json.loads(printed[printed.index("{") :])["other_eyes"]
+    assert "masks: shades, outlined by depth there, given masks here" in other and other in told
     said = other_eyes([after], perceiver.describe())
     assert "masks: shades, outlined by depth there, simulator instance ids here" in said
     assert other_eyes(shown, perceiver.describe()) == ""

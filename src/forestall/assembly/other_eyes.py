@@ -1,7 +1,7 @@
 """Whether demonstrations and scenes came through the same eyes, and what is said where not.
 
 Both sides of a comparison should: what one segmenter misses, or one estimator reads otherwise,
-looks like a change of the scene. Called by `checking` and `kept`; calls the readers.
+looks like a change of the scene. Called by `checking` and the command line; calls the readers.
 """
 
 from __future__ import annotations
