@@ -17,6 +17,7 @@ MADE_BY_USERS = {
     "observation.json", "record.json", "boundaries.jsonl", "runs/episodes.jsonl", "ladle-lost.toml",
     "fetch-ladle.toml", "episodes.jsonl", "experiment.json", "effort.jsonl", "summary.json",
     "task.json", "001.json", "OUT/failing.json", "OUT/report.json",
+    "graph.json", "perception.json", "config.json", "preprocessor_config.json",
 }  # fmt: skip
 
 
