@@ -172,3 +172,20 @@ def test_real_classes_run_from_folder_to_overlay(
     assert said["perception"]["segmenter"] == f"{finder}:tiny, outlined by sam2:tiny-sam", err
     assert said["scenes"][0]["masks"] > 0
     assert (tmp_path / "out" / "overlay.png").is_file()
+
+
+def test_states_and_features_come_from_the_encoder_that_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tiny.siglip(tmp_path / "tiny-siglip")
+    photo = unmasked(tmp_path / "photo")
+    flags = [*SHADES, "--image-encoder", "siglip", "--image-encoder.model", str(model)]
+    flags += ["--feature", "image", "--json"]
+    for states, name in (("given", "given states"), ("siglip", "learned states (siglip:tiny-sig")):
+        out = tmp_path / states
+        assert call(["perceive", str(photo), str(out), *flags, "--states", states]) == 0
+        used = json.loads(capsys.readouterr().out)["perception"]
+        assert used["features"] == "siglip:tiny-siglip"
+        assert used["state_estimator"].startswith(name)
+    graph = read_graph(tmp_path / "given" / "graph.json")
+    assert all(n.feature for n in graph.nodes if n.box_m is not None)

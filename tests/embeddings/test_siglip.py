@@ -12,9 +12,9 @@ from forestall.embeddings.contrastive import shown
 from forestall.embeddings.crops import crop
 from forestall.embeddings.siglip import SiglipEncoder
 from forestall.errors import InputError, ModelFileError
+from vision import tiny
 
 PIXELS, WIDTH, LENGTH = 32, 24, 16
-WORDS = ["a", "mug", "plate", "open", "microwave", "with", "coffee"]
 
 
 @pytest.fixture(autouse=True)
@@ -28,40 +28,7 @@ def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A SigLIP of two layers whose weights are random, with a tokenizer of a few words."""
-    torch = pytest.importorskip("torch")
-    transformers = pytest.importorskip("transformers")
-    tokenizers = pytest.importorskip("tokenizers")
-    torch.manual_seed(0)
-    tower = {
-        "hidden_size": WIDTH,
-        "intermediate_size": 48,
-        "num_hidden_layers": 2,
-        "num_attention_heads": 2,
-    }
-    config = transformers.SiglipConfig(
-        text_config={
-            **tower,
-            "vocab_size": 16,
-            "bos_token_id": 1,
-            "eos_token_id": 2,
-            "max_position_embeddings": LENGTH,
-        },
-        vision_config={**tower, "image_size": PIXELS, "patch_size": 8},
-    )
-    path = tmp_path_factory.mktemp("models") / "tiny-siglip"
-    model = transformers.SiglipModel(config)
-    model.logit_scale.data.fill_(2.0)
-    model.save_pretrained(path)
-    entries = {word: i for i, word in enumerate(["<pad>", "<unk>", "</s>", *WORDS])}
-    words = tokenizers.Tokenizer(tokenizers.models.WordLevel(entries, unk_token="<unk>"))
-    words.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
-    transformers.PreTrainedTokenizerFast(
-        tokenizer_object=words, pad_token="<pad>", unk_token="<unk>", eos_token="</s>"
-    ).save_pretrained(path)
-    size = {"height": PIXELS, "width": PIXELS}
-    transformers.SiglipImageProcessorPil(size=size).save_pretrained(path)
-    return path
+    return tiny.siglip(tmp_path_factory.mktemp("models") / "tiny-siglip")
 
 
 def scene() -> tuple[np.ndarray, list[np.ndarray]]:
@@ -73,8 +40,7 @@ def scene() -> tuple[np.ndarray, list[np.ndarray]]:
 
 
 def test_the_model_is_computed_as_transformers_does(folder: Path) -> None:
-    torch = pytest.importorskip("torch")
-    transformers = pytest.importorskip("transformers")
+    torch, transformers = tiny.libraries()
     siglip = SiglipEncoder(str(folder), batch=1)
     rgb, masks = scene()
     model = transformers.SiglipModel.from_pretrained(folder).eval()
@@ -106,7 +72,8 @@ def test_rows_are_unit_and_case_does_not_matter(folder: Path) -> None:
         siglip.encode(["кружка"])
 
 
-def test_pictures_of_any_size_are_another_model(folder: Path, tmp_path: Path) -> None:
+def test_pictures_of_any_size_are_another_model(tmp_path: Path) -> None:
+    tiny.libraries()
     (tmp_path / "naflex").mkdir()
     (tmp_path / "naflex" / "config.json").write_text(json.dumps({"model_type": "siglip2"}))
     with pytest.raises(ModelFileError, match="'siglip2' model and no SigLIP of a fixed picture"):

@@ -150,6 +150,40 @@ def sam2(path: Path) -> Path:
     return path
 
 
+def siglip(path: Path) -> Path:
+    """A SigLIP of two layers, with a tokenizer of a few words."""
+    _, transformers = libraries()
+    tokenizers = pytest.importorskip("tokenizers")
+    tower = {
+        "hidden_size": 24,
+        "intermediate_size": 48,
+        "num_hidden_layers": 2,
+        "num_attention_heads": 2,
+    }
+    config = transformers.SiglipConfig(
+        text_config={
+            **tower,
+            "vocab_size": 16,
+            "bos_token_id": 1,
+            "eos_token_id": 2,
+            "max_position_embeddings": 16,
+        },
+        vision_config={**tower, "image_size": 32, "patch_size": 8},
+    )
+    model = transformers.SiglipModel(config)
+    model.logit_scale.data.fill_(2.0)
+    model.save_pretrained(path)
+    known = ["<pad>", "<unk>", "</s>", "a", "mug", "plate", "open", "microwave", "with", "coffee"]
+    entries = {word: i for i, word in enumerate(known)}
+    words = tokenizers.Tokenizer(tokenizers.models.WordLevel(entries, unk_token="<unk>"))
+    words.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
+    transformers.PreTrainedTokenizerFast(
+        tokenizer_object=words, pad_token="<pad>", unk_token="<unk>", eos_token="</s>"
+    ).save_pretrained(path)
+    transformers.SiglipImageProcessorPil(size={"height": 32, "width": 32}).save_pretrained(path)
+    return path
+
+
 def _decoder() -> dict[str, Any]:
     return {
         "hidden_size": 16,
