@@ -308,7 +308,8 @@ class Segmenter(Protocol):
     """Finds instances in a frame.
 
     One with a method `segment_all(frames)`, an answer for each, is asked for all frames of an
-    observation at once.
+    observation at once. One whose `tracks` is False has no names of its own for things: the world
+    is then spoken to as one that keeps its names to itself.
     """
 
     name: str

@@ -60,6 +60,8 @@ class FoundSegmenter:
         UnknownNameError: a category that the domain, or the finder, does not have.
     """
 
+    tracks = False
+
     def __init__(
         self,
         finder: Finder,
