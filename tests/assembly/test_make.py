@@ -146,8 +146,10 @@ def test_parts_are_listed_with_their_options(capsys: pytest.CaptureFixture[str])
 
 def test_a_segmenter_without_names_of_the_worlds_speaks_to_it_through_an_edge() -> None:
     shades = {"name": "vision.shades:Shades", "words": "mug"}
-    plain = {"world": "symbolic", "states": "oracle"}
-    prepared = prepare(run_config("heat-potato", segmenter="finder", finder=shades, **plain))
+    config = run_config(
+        "heat-potato", segmenter="finder", finder=shades, world="symbolic", states="oracle"
+    )
+    prepared = prepare(config)
     loaded = prepared.loaded
     with make_world(prepared.config, loaded.domain).open(loaded.task.scene, loaded.domain) as world:
         assert isinstance(make_environment(prepared, world), WorldsEdge)
