@@ -18,6 +18,7 @@ MADE_BY_USERS = {
     "fetch-ladle.toml", "episodes.jsonl", "experiment.json", "effort.jsonl", "summary.json",
     "task.json", "001.json", "OUT/failing.json", "OUT/report.json", "run.json", "meta/info.json",
     "scene.json", "data/tasks/TASK.json",
+    "graph.json", "perception.json", "config.json", "preprocessor_config.json",
 }  # fmt: skip
 
 

@@ -28,6 +28,7 @@ from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
 from forestall.types.foreign import ForeignPlan, ForeignRun
 from forestall.types.graph import SceneGraph
+from forestall.types.grounding import Corners, GroundedBox
 from forestall.types.kind import Kind
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
@@ -324,12 +325,42 @@ class Renderer(Protocol):
 
 
 class Segmenter(Protocol):
-    """Finds instances in a frame."""
+    """Finds instances in a frame.
+
+    One with a method `segment_all(frames)`, an answer for each, is asked for all frames of an
+    observation at once. One whose `tracks` is False has no names of its own for things: the world
+    is then spoken to as one that keeps its names to itself.
+    """
 
     name: str
 
     def segment(self, frame: Frame) -> Sequence[Detection]:
         """Instance masks with categories; the same instance name over frames when it tracks."""
+
+
+class Finder(Protocol):
+    """Finds in pictures what phrases name: boxes, without outlines.
+
+    `vocabulary` is all that it can be asked for, None for one that takes any phrase.
+    """
+
+    name: str
+    vocabulary: Sequence[str] | None
+
+    def find(
+        self, pictures: Sequence[Rgb], phrases: Sequence[str]
+    ) -> Sequence[Sequence[GroundedBox]]:
+        """For each picture what was found in it; several boxes may be of one thing."""
+
+
+class Outliner(Protocol):
+    """Turns boxes into masks; `exact`: a mask ends where its thing ends."""
+
+    name: str
+    exact: bool
+
+    def outline(self, frame: Frame, boxes: Sequence[Corners]) -> Sequence[Mask]:
+        """For each box the (H, W) mask of the thing in it; an empty one where there is none."""
 
 
 class StateEstimator(Protocol):

@@ -16,6 +16,7 @@ from typing import Any
 from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
 from forestall.assembly.corrections import described, remembering
 from forestall.assembly.make import STORED_STATES, provenance
+from forestall.assembly.other_eyes import other_eyes
 from forestall.assembly.own_domain import domain_of_demonstrations
 from forestall.assembly.parts import Assembly
 from forestall.assembly.plans import fitting, read_plan
@@ -96,12 +97,14 @@ class Judgement:
 class Judgements:
     """Every scene's, and the record from which the page is drawn.
 
-    `limits` say what cannot be judged because the domain was learnt from the demonstrations.
+    `limits` say what cannot be judged because the domain was learnt from the demonstrations, `eyes`
+    that these were seen with other parts than the scenes; "" where they were not.
     """
 
     each: tuple[Judgement, ...]
     record: EpisodeRecord
     limits: tuple[str, ...] = ()
+    eyes: str = ""
 
     @property
     def outcome(self) -> Outcome:
@@ -168,6 +171,7 @@ def judge_stored(
         found.append(
             judgement_of(stored.path, asked(monitor, stored.scene, wanted), pictures, domain)
         )
+    eyes = other_eyes(demonstrations or (), perceiver.describe(), scenes)
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -185,10 +189,11 @@ def judge_stored(
             ("memory", memory),
             ("corrections", described(config.choices, memory)),
             ("observations", [str(path) for path in scenes]),
+            ("other eyes", eyes or None),
             ("inputs", {"task": repr(task), "domain": digest_of(domain)}),
         ),
     )
-    return Judgements(tuple(found), record, limits)
+    return Judgements(tuple(found), record, limits, eyes)
 
 
 def _read(

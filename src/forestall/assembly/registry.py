@@ -44,6 +44,7 @@ class Table:
 _SEEING = "forestall.assembly.seeing"
 _JUDGING = "forestall.assembly.judging"
 _EMBEDDINGS = "forestall.embeddings"
+_VISION = "forestall.vision"
 _LANGUAGE = "forestall.assembly.language"
 
 TABLES: Mapping[str, Table] = {
@@ -79,14 +80,35 @@ TABLES: Mapping[str, Table] = {
             kinds.SEGMENTER,
             "instance-ids",
             {
+                "finder": f"{_SEEING}:finder",
                 "instance-ids": f"{_SEEING}:instance_ids",
                 "given-masks": f"{_SEEING}:given_masks",
             },
         ),
         Table(
+            kinds.FINDER,
+            "grounding-dino",
+            {
+                "grounding-dino": f"{_VISION}.grounding_dino:GroundingDinoFinder",
+                "onnx": f"{_VISION}.onnx_finder:OnnxFinder",
+                "owlv2": f"{_VISION}.owl:Owlv2Finder",
+            },
+        ),
+        Table(
+            kinds.OUTLINER,
+            "depth",
+            {
+                "depth": "forestall.perception.outlines:DepthOutliner",
+                "sam": f"{_VISION}.sam:SamOutliner",
+            },
+        ),
+        Table(
             kinds.STATES,
             "learned",
-            {name: f"{_SEEING}:{name}" for name in ("clip", "given", "learned", "oracle")},
+            {
+                name: f"{_SEEING}:{name}"
+                for name in ("clip", "given", "learned", "oracle", "siglip")
+            },
         ),
         Table(
             kinds.PERCEIVER,
@@ -107,6 +129,7 @@ TABLES: Mapping[str, Table] = {
             "two-tower",
             {
                 "clip": f"{_EMBEDDINGS}.clip:ClipEncoder",
+                "siglip": f"{_EMBEDDINGS}.siglip:SiglipEncoder",
                 "two-tower": f"{_EMBEDDINGS}.twotower:TwoTowerEncoder",
             },
         ),

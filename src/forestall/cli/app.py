@@ -22,6 +22,7 @@ from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
 from forestall.cli.parts import parts
+from forestall.cli.perceive import perceive
 from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
 from forestall.cli.replay import replay
@@ -36,7 +37,19 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, view, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
+for command in (
+    run,
+    view,
+    page,
+    tasks,
+    scenarios,
+    parts,
+    perceive,
+    check,
+    compare,
+    calibrate,
+    doctor,
+):
     app.command(command)
 app.command(import_, name="import")
 app.command(replay)

@@ -56,9 +56,11 @@ def run(
     from forestall.assembly.configuration import run_config
     from forestall.assembly.logs import logging_to
     from forestall.assembly.make import needs_memory, prepare, run_episode
+    from forestall.assembly.other_eyes import other_eyes
     from forestall.files import alone, make_folder
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
+    from forestall.records.derived import provenance_of
     from forestall.records.listeners import ProgressLine
     from forestall.records.record import RECORD_NAME, RunRecorder, read_record, write_record
     from forestall.report.page import write_page
@@ -84,6 +86,8 @@ def run(
             if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
                 write_record(folder, record, page=str(page))
             write_page(record, page)
+            if eyes := other_eyes(demonstrations or (), provenance_of(record, "perception")):
+                print(f"forestall: {eyes}", file=sys.stderr)
             data = record_to_json(read_record(folder), page=str(page))
         if as_json:
             print(json.dumps(data, indent=2), flush=True)

@@ -75,6 +75,7 @@ class _Detection(_Strict):
     id: int | None = Field(default=None, gt=0)
     mask: str | None = None
     score: float = Field(default=1.0, ge=0, le=1)
+    outlined: bool = True
     states: dict[str, str] = {}
 
 
@@ -293,7 +294,7 @@ class _Reading:
                 )
             used.add(source)
             mask = _mask(self._folder, given, how, masks, where, shape)
-            found.append(Detection(category, mask, instance, given.score))
+            found.append(Detection(category, mask, instance, given.score, given.outlined))
         return tuple(found)
 
     def _named(self, given: _Detection) -> tuple[str, str | None]:

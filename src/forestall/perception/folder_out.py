@@ -79,9 +79,9 @@ def _write_frame(
         arrays: dict[str, Any] = {f"m{i}": d.mask for i, d in enumerate(frame.detections)}
         np.savez_compressed(folder / masks, **arrays)
         for key, d in zip(arrays, frame.detections, strict=True):
-            detections.append(
-                {"category": d.category, "instance": d.instance, "score": d.score, "mask": key}
-            )
+            told: dict[str, object] = {"category": d.category, "instance": d.instance}
+            told |= {"score": d.score, "mask": key}
+            detections.append(told if d.outlined else {**told, "outlined": False})
     elif frame.instance_ids is not None:
         masks = f"masks{tail}.png"
         Image.fromarray((frame.instance_ids + 1).astype(np.uint16)).save(folder / masks)
