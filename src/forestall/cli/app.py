@@ -10,6 +10,7 @@ from cyclopts import App
 import forestall
 from forestall.cli import experiments, robustness, third_party
 from forestall.cli.bench import bench
+from forestall.cli.beside import beside
 from forestall.cli.calibrate import calibrate
 from forestall.cli.cases import cases
 from forestall.cli.demos import demos
@@ -35,7 +36,19 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, view, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
+for command in (
+    run,
+    beside,
+    view,
+    page,
+    tasks,
+    scenarios,
+    parts,
+    check,
+    compare,
+    calibrate,
+    doctor,
+):
     app.command(command)
 app.command(import_, name="import")
 app.command(demos)

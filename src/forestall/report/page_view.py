@@ -27,6 +27,7 @@ from forestall.records.derived import (
 from forestall.records.exchanges import Taken, exchanges_of, taken
 from forestall.records.pictures import Picture, page_picture, rgb_of
 from forestall.records.plain import plain
+from forestall.report.beside_view import BesideView, beside_view
 from forestall.report.drawn import Drawn, drawn
 from forestall.report.exchange_view import ExchangeView, exchange_views
 from forestall.report.graph_svg import graph_svg
@@ -116,15 +117,22 @@ class Page:
     model: Taken
     phases: tuple[Bar, ...]
     provenance: tuple[tuple[str, str], ...]
+    beside: BesideView | None
 
 
-def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -> Page:
+def page_view(
+    record: EpisodeRecord,
+    folder: Path | None,
+    pictures_bytes: int,
+    others: Sequence[EpisodeRecord] = (),
+) -> Page:
     """Everything that the template needs.
 
     Args:
         record: of the run.
         folder: where its pictures lie.
         pictures_bytes: how large all pictures together may be.
+        others: of the same start under other strategies.
     """
     all_moments = moments(record)
     frames = sum(
@@ -142,7 +150,7 @@ def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -
         record=record,
         cards=cards,
         heading=_heading(all_moments),
-        story=story(record),
+        story=story(record, others),
         alarms=alarms(record),
         places={c.moment.position: c.number for c in cards if c.moment.position is not None},
         legend=_legend(all_moments),
@@ -158,6 +166,7 @@ def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -
             for name, seconds in sorted(record.compute_s, key=lambda x: (-x[1], x[0]))
         ),
         provenance=tuple((str(k), _words(v)) for k, v in record.provenance),
+        beside=beside_view(record, others),
     )
 
 

@@ -23,6 +23,7 @@ from forestall.experiments.stored import ABOUT, PACKED, ROWS
 from forestall.files import replace_file
 from forestall.reading.documents import read_json
 from forestall.reading.files import read_bytes, read_packed_text
+from forestall.records.beside import BESIDE_NAME
 from forestall.records.record import LINES_NAME, RECORD_NAME
 from forestall.view.rows import RunRow, read_row
 
@@ -136,6 +137,8 @@ def _sources(folder: Path, place: str, deep: int) -> Iterator[tuple[str, Path]]:
     own = next((n for n in (RECORD_NAME, LINES_NAME) if n in inside), None)
     if own is not None:
         yield place, folder / own
+        if BESIDE_NAME in inside and deep:
+            yield from _sources(folder / BESIDE_NAME, _joined(place, BESIDE_NAME), deep - 1)
         return
     if ABOUT in inside:
         rows = next((n for n in (ROWS, ROWS + PACKED) if n in inside), ABOUT)
@@ -144,7 +147,11 @@ def _sources(folder: Path, place: str, deep: int) -> Iterator[tuple[str, Path]]:
         return
     for name in sorted(inside):
         if not name.startswith(".") and inside[name].is_dir(follow_symlinks=False):
-            yield from _sources(folder / name, f"{place}/{name}" if place else name, deep - 1)
+            yield from _sources(folder / name, _joined(place, name), deep - 1)
+
+
+def _joined(place: str, name: str) -> str:
+    return f"{place}/{name}" if place else name
 
 
 def _stamp(source: Path) -> list[int] | None:

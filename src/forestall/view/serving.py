@@ -21,6 +21,7 @@ from urllib.parse import parse_qs, unquote_to_bytes, urlsplit
 
 from forestall.errors import InputError
 from forestall.reading.files import inside, read_bytes
+from forestall.records.beside import records_beside
 from forestall.records.record import LINES_NAME, RECORD_NAME, read_record
 from forestall.report.experiment_page import experiment_script
 from forestall.report.page import page_html, page_script
@@ -71,7 +72,7 @@ class ViewServer(PageServer):
         self.local = host in _LOCAL
         self.stopping = threading.Event()
         self._lock = threading.Lock()
-        self._pages: OrderedDict[tuple[str, int, int], str] = OrderedDict()
+        self._pages: OrderedDict[tuple[str, tuple[tuple[int, int], ...]], str] = OrderedDict()
         super().__init__(host, port, _Handler)
 
     def shutdown(self) -> None:
@@ -86,8 +87,9 @@ class ViewServer(PageServer):
             FileFormatError: its record is damaged.
         """
         folder = self.index.folder_of(place)
-        stat = (source_of(folder) or folder).stat()
-        key = (place, stat.st_mtime_ns, stat.st_size)
+        sources = (source_of(folder) or folder, *records_beside(folder))
+        stats = tuple((s.st_mtime_ns, s.st_size) for s in (source.stat() for source in sources))
+        key = (place, stats)
         with self._lock:
             found = self._pages.get(key)
         if found is None:
@@ -161,6 +163,9 @@ class _Handler(PageHandler):
         place, pictures, name = f"/{rest}".rpartition("/images/")
         if pictures and rest.removesuffix("/") not in self.server.index.now().runs:
             self._file(self._known(place[1:]).place, f"images/{name}")
+            return
+        if rest.endswith("/index.html"):  # as pages of folders lead to each other
+            self._go(run_link(self._known(rest.removesuffix("/index.html")).place))
             return
         row = self._known(rest.removesuffix("/"))
         folder = self.server.index.folder_of(row.place)
