@@ -105,7 +105,7 @@ def test_a_record_that_does_not_say_how_it_was_made_is_not_run_again(
         {},
         {"scenario": "hole-full-of-chips", "seed": 5, "strategy": "plan-check"},
         {"detector": {"name": "scene-graph", "threshold": 0.8}, "without": "structure"},
-        {"domain": "assembly", "keep_observations": False, "final_look": True},
+        {"domain": "bench", "keep_observations": False, "final_look": True},
     ],
 )
 def test_a_record_gives_the_configuration_back(how: dict[str, Any]) -> None:

@@ -79,7 +79,7 @@ def _timeline(page: Page) -> Markup:
 
 def page_script() -> str:
     """The script that every page carries; whoever serves pages allows this one alone."""
-    return template("page.js")
+    return template("page.js") + template("space.js")
 
 
 def template(name: str) -> str:

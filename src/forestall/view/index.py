@@ -13,7 +13,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +211,7 @@ def _cached(folder: Path) -> dict[str, tuple[list[int], RunRow | ExperimentRow]]
 
 def _keep(folder: Path, kept: Mapping[str, tuple[list[int], RunRow | ExperimentRow]]) -> None:
     rows: dict[str, Any] = {
-        place: [stamp, "run" if isinstance(row, RunRow) else "experiment", asdict(row)]
+        place: [stamp, "run" if isinstance(row, RunRow) else "experiment", _plain(row)]
         for place, (stamp, row) in kept.items()
     }
     try:
@@ -220,3 +220,7 @@ def _keep(folder: Path, kept: Mapping[str, tuple[list[int], RunRow | ExperimentR
         replace_file(file, json.dumps({"format": CACHE_FORMAT, "rows": rows}).encode())
     except (ForestallError, OSError, ValueError):
         return
+
+
+def _plain(row: RunRow | ExperimentRow) -> dict[str, Any]:
+    return {name: getattr(row, name) for name in row.__slots__}
