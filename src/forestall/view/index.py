@@ -13,12 +13,14 @@ import os
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from forestall.config import cache_dir
 from forestall.errors import FileFormatError, ForestallError
+from forestall.experiments.folder import EFFORT, episodes_in
 from forestall.experiments.stored import ABOUT, PACKED, ROWS
 from forestall.files import replace_file
 from forestall.reading.documents import read_json
@@ -27,7 +29,7 @@ from forestall.records.beside import BESIDE_NAME
 from forestall.records.record import LINES_NAME, RECORD_NAME
 from forestall.view.rows import RunRow, read_row
 
-CACHE_FORMAT = 1
+CACHE_FORMAT = 2
 
 _MOST_DEEP = 6
 _PAGE = "index.html"
@@ -46,6 +48,7 @@ class ExperimentRow:
         split: that it was run on, "" where it says none.
         episodes: how many are finished.
         page: whether there is a page of it.
+        wanted: how many episodes were asked for; 0 where nobody wrote that down.
     """
 
     place: str
@@ -54,6 +57,7 @@ class ExperimentRow:
     split: str
     episodes: int
     page: bool
+    wanted: int = 0
 
     @property
     def name(self) -> str:
@@ -155,13 +159,17 @@ def _joined(place: str, name: str) -> str:
 
 
 def _stamp(source: Path) -> list[int] | None:
-    """When the file was changed and how large it is; also whether an experiment has a page."""
+    """When the file was changed, how large it is, and what else tells of an experiment."""
     try:
         found = source.stat()
     except OSError:
         return None
-    page = source.name.startswith((ROWS, ABOUT)) and (source.parent / _PAGE).is_file()
-    return [found.st_mtime_ns, found.st_size, int(page), int(source.name == RECORD_NAME)]
+    page, effort = False, 0
+    if source.name.startswith((ROWS, ABOUT)):
+        page = (source.parent / _PAGE).is_file()
+        with suppress(OSError):
+            effort = (source.parent / EFFORT).stat().st_size
+    return [found.st_mtime_ns, found.st_size, int(page), int(source.name == RECORD_NAME), effort]
 
 
 def _read(place: str, source: Path, changed_s: float) -> RunRow | ExperimentRow:
@@ -175,8 +183,11 @@ def _read(place: str, source: Path, changed_s: float) -> RunRow | ExperimentRow:
         episodes = _episodes(source)
     except (FileFormatError, OSError) as error:
         kind, episodes = str(error), 0
+    wanted = 0
+    with suppress(FileFormatError, OSError):  # results of some kinds are not counted ahead
+        wanted = sum(a.episodes for a in episodes_in(source.parent).asked())
     page = (source.parent / _PAGE).is_file()
-    return ExperimentRow(place, changed_s, kind, split, episodes, page)
+    return ExperimentRow(place, changed_s, kind, split, episodes, page, wanted)
 
 
 def _episodes(source: Path) -> int:

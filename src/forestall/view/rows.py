@@ -118,7 +118,7 @@ def outcome_of(row: RunRow, folder: Path) -> Outcome:
     if row.problem:
         return Outcome.UNREADABLE
     if not row.over:
-        return Outcome.RUNNING if _at_work(folder, row.changed_s) else Outcome.BROKEN_OFF
+        return Outcome.RUNNING if at_work(folder, row.changed_s) else Outcome.BROKEN_OFF
     if row.success is None:
         return Outcome.NOT_SCORED
     return Outcome.SUCCEEDED if row.success else Outcome.FAILED
@@ -164,7 +164,9 @@ def _brief(head: str) -> dict[str, Any] | None:
         return None
     texts = (f'"{k}": {found[k]}' for k in _WANTED - _LISTED)
     listed = {k: [None] * counts[k] for k in _LISTED if found[k] in ("[", "[]")}
-    return None if len(listed) < len(_LISTED) else {**parse_json(f"{{{', '.join(texts)}}}"), **listed}
+    return (
+        None if len(listed) < len(_LISTED) else {**parse_json(f"{{{', '.join(texts)}}}"), **listed}
+    )
 
 
 def _whole(place: str, data: Any, changed_s: float) -> RunRow:
@@ -217,7 +219,7 @@ def _time(event: Mapping[str, Any]) -> float:
     return float(told) if isinstance(told, int | float) else 0.0
 
 
-def _at_work(folder: Path, changed_s: float) -> bool:
+def at_work(folder: Path, changed_s: float) -> bool:
     """Whether somebody still writes: the holder of the folder or of one above it lives.
 
     Where nobody holds one, or who does is on another machine, what was written lately counts.
