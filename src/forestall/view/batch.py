@@ -1,7 +1,8 @@
 """An experiment while it runs: how far it is, and its newest episodes. Called by `serving.py`.
 
 A call of the command writes down what it wants before it begins (`effort.jsonl`), and a line for
-each finished episode. Of those lines the last are read; how many there are the index knows.
+each finished episode. They are counted in the bytes that the page asks to be told of: the index may
+be a moment older.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from typing import Any
 
 from forestall.errors import FileFormatError
 from forestall.experiments.folder import episodes_in
-from forestall.experiments.stored import ROWS, Asked
+from forestall.experiments.stored import MOST_ROWS_BYTES, ROWS, Asked
 from forestall.reading.documents import parse_json
+from forestall.reading.files import read_bytes
 
 NEWEST = 20
 """So many episodes are shown."""
@@ -51,11 +53,13 @@ class Batch:
 
     Args:
         asked: what is wanted, by set and setup.
-        newest: episodes, the last one first.
-        size: of the file of rows in bytes; a page asks what has come since.
+        done: how many episodes are finished.
+        newest: of them, the last one first.
+        size: of the file of rows in bytes, when it was read; a page asks what has come since.
     """
 
     asked: Sequence[Asked]
+    done: int
     newest: Sequence[EpisodeLine]
     size: int
 
@@ -67,9 +71,13 @@ def batch_of(folder: Path) -> Batch:
         FileFormatError: what it writes is damaged.
     """
     asked = sorted(episodes_in(folder).asked(), key=lambda a: (a.profile, a.set, a.setup))
-    lines, size = _last_lines(folder / ROWS)
+    data = read_bytes(folder / ROWS, "results", MOST_ROWS_BYTES) if size_of(folder) else b""
+    whole = data[: data.rfind(b"\n") + 1]
+    lines = whole[-_TAIL_BYTES:].decode("utf-8", "replace").split("\n")[:-1]
+    if len(whole) > _TAIL_BYTES:
+        del lines[0]  # the first may be half of one
     found = [_line(parse_json(line)) for line in reversed(lines[-NEWEST:])]
-    return Batch(asked, found, size)
+    return Batch(asked, whole.count(b"\n"), found, len(data))
 
 
 def size_of(folder: Path) -> int:
@@ -78,18 +86,6 @@ def size_of(folder: Path) -> int:
         return (folder / ROWS).stat().st_size
     except OSError:
         return 0
-
-
-def _last_lines(file: Path) -> tuple[list[str], int]:
-    """The last whole lines of a file, and its size."""
-    size = size_of(file.parent)
-    if not size:
-        return [], 0
-    with file.open("rb") as rows:
-        rows.seek(max(0, size - _TAIL_BYTES))
-        data = rows.read(_TAIL_BYTES)
-    whole = data[: data.rfind(b"\n") + 1].decode("utf-8", "replace").split("\n")[:-1]
-    return (whole if size <= _TAIL_BYTES else whole[1:]), size
 
 
 def _line(row: Any) -> EpisodeLine:
