@@ -276,6 +276,16 @@ class Monitor:
         return self._strategy.looks_after
 
     @property
+    def task(self) -> Task:
+        """What the run is of."""
+        return self._run.task
+
+    @property
+    def strategy(self) -> str:
+        """The name of the strategy."""
+        return self._strategy.name
+
+    @property
     def plan(self) -> Plan:
         """The plan at hand."""
         return self._run.plan

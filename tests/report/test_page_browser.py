@@ -66,6 +66,66 @@ def test_every_control_of_the_page(drawn: str, chromium: Any, where: str) -> Non
     assert all(url.startswith(("file:", "data:")) for url in asked)
 
 
+@pytest.mark.parametrize("where", list(WIDTHS))
+def test_the_3d_view_turns_and_marks_what_the_picture_marks(
+    drawn: str, chromium: Any, where: str
+) -> None:
+    page = page_of(chromium, where)
+    page.goto(drawn)
+    alarm = page.locator(f"#moment-{records.ALARM_INDEX + 1}")
+    view, plate = alarm.locator(".space svg"), alarm.locator('.space [data-node="Plate-1"]')
+    seen = [shape(plate)]
+    for key in ("ArrowLeft", "ArrowUp", "+", "-", "Home"):
+        view.press(key)
+        seen.append(shape(plate))
+    assert len(set(seen[:4])) == 4 and seen[5] == seen[0]
+    assert page.locator("#where").text_content() == "8 of 14"  # the keys are those of the view
+    for name in ("turn right", "look from lower", "nearer", "farther", "as at first"):
+        alarm.get_by_role("button", name=name).click()
+        seen.append(shape(plate))
+    assert len(set(seen[5:9])) == 4 and seen[-1] == seen[0]
+    box = view.bounding_box()
+    page.mouse.move(box["x"] + 60, box["y"] + 90)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 110, box["y"] + 120)
+    page.mouse.up()
+    assert shape(plate) != seen[0]
+    view.press("Home")
+    node, x, y = view.evaluate(ON_TOP)
+    page.mouse.move(x, y)
+    for where_else in (".box", ".space .sp-box"):
+        thing = alarm.locator(f'{where_else}[data-node="{node}"]')
+        assert thing.evaluate("e => e.classList.contains('pointed')")
+    page.locator("h1").hover()
+    assert alarm.locator(".pointed").count() == 0
+    alarm.locator('.fg-placed[data-node="Plate-1"]').focus()
+    assert plate.evaluate("e => e.classList.contains('pointed')")
+    assert_fits(page)
+    page.context.close()
+
+
+ON_TOP = """svg => {
+    for (const box of svg.querySelectorAll(".near")) {
+        const at = box.querySelector("polygon").getBoundingClientRect();
+        const x = at.left + at.width / 2, y = at.top + at.height / 2;
+        const there = document.elementFromPoint(x, y);
+        const node = box.getAttribute("data-node");
+        const framed = [...svg.closest("article").querySelectorAll(".box")].some(
+            b => b.getAttribute("data-node") === node);
+        if (framed && there && there.closest("[data-node]") === box) { return [node, x, y]; }
+    }
+}"""
+"""The first box of the 3D view that the picture frames, too, and that nothing hides."""
+
+
+def shape(box: Any) -> str:
+    """Where the faces of a box are drawn."""
+    found: str = box.evaluate(
+        "e => [...e.querySelectorAll('polygon')].map(p => p.getAttribute('points')).join(' ')"
+    )
+    return found
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing(tmp_path: Path, chromium: Any, scheme: str) -> None:
     page = page_of(chromium, "desktop", color_scheme=scheme)

@@ -68,3 +68,18 @@ def test_harm_is_told_before_goals_that_were_missed() -> None:
     whole = records.unjudged_record()
     harmed = replace(whole, harmed=((12.0, "spoiled(Potato-1)"),))
     assert story(harmed).endswith("of robot time: spoiled(Potato-1).")
+
+
+def test_the_same_start_without_a_monitor_is_told_of() -> None:
+    run, alone = records.potato_record(), records.unjudged_record()
+    told = story(run, [alone])
+    assert told.startswith(story(run))
+    assert told.endswith(
+        " Run once more without a monitor, the task failed after 52.0 s of robot time: "
+        "inside(?plate, Microwave): the plate is on CounterTop-2."
+    )
+    sooner = replace(run, strategy="online", simulated_s=40.0)
+    assert story(run, [sooner]).endswith(
+        "Run once more with the strategy online, the task succeeded after 40.0 s of robot time, "
+        "12.0 s sooner."
+    )

@@ -45,6 +45,24 @@ def make(folder: Path) -> None:
     (experiment / "tables" / "a.csv").write_text("a,b\n")
 
 
+def begin_experiment(folder: Path, wanted: int) -> None:
+    """An experiment of which no episode is finished yet."""
+    asked = {"set": "robofail", "profile": "kind", "strategy": "watch", "setup": "watch"}
+    call = {"jobs": 2, "engine": "local", "machine": "m", "python": "3", "date": "2026-01-01"}
+    effort = {**call, "episodes": 0, "seconds": 0.0, "asked": [{**asked, "episodes": wanted}]}
+    folder.mkdir(parents=True)
+    (folder / "experiment.json").write_text(json.dumps({"kind": "experiment", "split": "dev"}))
+    (folder / "effort.jsonl").write_text(json.dumps(effort) + "\n")
+    (folder / "episodes.jsonl").write_text("")
+
+
+def add_episode(folder: Path, **said: object) -> None:
+    """One more is finished."""
+    row = {"task": "heat-potato", "scenario": None, "strategy": "watch", "seed": 3, "end": "over"}
+    with (folder / "episodes.jsonl").open("a") as rows:
+        rows.write(json.dumps({**row, "success": True, "simulated_s": 52.0, **said}) + "\n")
+
+
 @contextmanager
 def shown(folder: Path) -> Iterator[ViewServer]:
     """A server that answers."""

@@ -9,11 +9,13 @@ from typing import Any
 import pytest
 
 from browsers import WIDTHS, assert_fits, axe_says, page_of
+from forestall.files import alone
+from forestall.records.beside import folder_beside
 from forestall.records.record import RunRecorder, write_record
 from forestall.view.choosing import EACH
 from report import records
 
-from .folders import NASTY, make, named, shown
+from .folders import LONG, NASTY, add_episode, begin_experiment, make, named, shown
 
 pytestmark = pytest.mark.slow
 
@@ -79,6 +81,28 @@ def test_a_run_is_followed_to_its_end(tmp_path: Path, chromium: Any, where: str)
         page.context.close()
 
 
+@pytest.mark.parametrize("where", list(WIDTHS))
+def test_a_batch_is_followed_and_the_index_with_it(
+    tmp_path: Path, chromium: Any, where: str
+) -> None:
+    folder = tmp_path / "batch"
+    begin_experiment(folder, 3)
+    page = page_of(chromium, where)
+    with shown(tmp_path) as server, alone(folder):
+        page.goto(server.address)
+        page.get_by_text("0 of 3 episodes").wait_for()
+        add_episode(folder, scenario=LONG)
+        page.get_by_text("1 of 3 episodes").wait_for()
+        assert_fits(page)
+        page.get_by_role("link", name="batch").click()
+        page.get_by_role("status").get_by_text("1 of 3 episodes").wait_for()
+        assert_fits(page)
+        add_episode(folder, success=False)
+        page.get_by_text("2 of 3 episodes").wait_for()
+        assert page.locator("ol.lines li").count() == 2
+        page.context.close()
+
+
 def test_without_javascript_it_works_as_well(tmp_path: Path, chromium: Any) -> None:
     for k in range(EACH + 1):
         empty = replace(records.empty_record(), seed=k)
@@ -101,9 +125,13 @@ def test_without_javascript_it_works_as_well(tmp_path: Path, chromium: Any) -> N
 def test_axe_finds_nothing(tmp_path: Path, chromium: Any, scheme: str) -> None:
     folder = tmp_path / "runs"
     make(folder)
+    begin_experiment(folder / "batch", 3)
+    add_episode(folder / "batch")
+    write_record(folder_beside(folder / "good", "none"), records.unjudged_record())
     page = page_of(chromium, "phone", color_scheme=scheme, bypass_csp=True)
-    with shown(folder) as server:
-        for path in ("", "run/good/", "run/begun/", "compare?run=good&run=deep/bad", "none"):
+    pair = "compare?run=good&run=deep/bad"
+    with shown(folder) as server, alone(folder / "batch"):
+        for path in ("", "run/good/", "run/begun/", pair, "experiment/batch/", "none"):
             page.goto(f"{server.address}{path}")
             assert axe_says(page) == "", path
         page.context.close()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -132,6 +132,7 @@ def run_episode(
     memory: str | None = None,
     trace: TruthTrace | None = None,
     world: WorldPart | None = None,
+    beside: Mapping[str, Any] | None = None,
 ) -> EpisodeRecord:
     """Build everything and run one episode.
 
@@ -142,6 +143,7 @@ def run_episode(
         memory: where the demonstrations come from, for the record.
         trace: keeps what is true at each boundary, for scoring.
         world: made before and used again, so that it may remember what it drew.
+        beside: which run this is the same start of, for the record.
     """
     loaded = prepared.loaded
     needs = apply_scene_faults(loaded.task.scene, prepared.faults, loaded.domain)
@@ -173,6 +175,7 @@ def run_episode(
                         "model": None if prepared.model is None else digest_of(prepared.model),
                     },
                 ),
+                *(() if beside is None else (("beside", dict(beside)),)),
             ),
         )
 

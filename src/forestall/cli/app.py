@@ -10,6 +10,7 @@ from cyclopts import App
 import forestall
 from forestall.cli import experiments, robustness, third_party
 from forestall.cli.bench import bench
+from forestall.cli.beside import beside
 from forestall.cli.calibrate import calibrate
 from forestall.cli.cases import cases
 from forestall.cli.demos import demos
@@ -39,6 +40,7 @@ app = App(
 )
 for command in (
     run,
+    beside,
     view,
     page,
     tasks,

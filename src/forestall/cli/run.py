@@ -8,11 +8,23 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from forestall.cli.beside import (
+    ALL,
+    FIRST,
+    OTHERS,
+    Names,
+    beside_json,
+    named,
+    recorded,
+    run_beside,
+    told,
+)
 from forestall.cli.demos import memory_of
 from forestall.cli.flags import RunFlags
 
@@ -33,6 +45,7 @@ def run(
     without: str | None = None,
     out: Path | None = None,
     log: str | None = None,
+    beside: Names = None,
     parts: RunFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
@@ -48,51 +61,60 @@ def run(
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         log: keep all that is seen and done, too: mcap:FILE, lerobot:FOLDER or folder:FOLDER, for
             `forestall import` and `forestall replay` (docs/logs.md).
-        parts: which parts.
+        beside: strategies that the same start is run under as well; none: what it would have cost
+            to have no monitor.
+        parts: which parts; the strategy `all` is proactive beside none, post-hoc and online.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
         live: show the run in a browser while it happens, and its page until Ctrl-C.
     """
+    from forestall.assembly.again import under
     from forestall.assembly.configuration import run_config
     from forestall.assembly.logs import logging_to
-    from forestall.assembly.make import needs_memory, prepare, run_episode
+    from forestall.assembly.make import needs_memory, prepare
     from forestall.assembly.other_eyes import other_eyes
     from forestall.files import alone, make_folder
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
     from forestall.records.derived import provenance_of
-    from forestall.records.listeners import ProgressLine
-    from forestall.records.record import RECORD_NAME, RunRecorder, read_record, write_record
+    from forestall.records.record import read_record
     from forestall.report.page import write_page
 
+    also = list(beside or ())
+    if parts.strategy == ALL:
+        parts, also = replace(parts, strategy=FIRST), [*OTHERS, *also]
     given, of_run = parts.read()
     flags = {"scenario": scenario, "seed": seed, "without": without}
     of_run |= {name: value for name, value in flags.items() if value is not None}
     config = run_config(task, given=given, final_look=log is not None, **of_run)
-    prepared = prepare(config)
-    name = None if prepared.scenario is None else prepared.scenario.name
     strategy = config.choice(STRATEGY).name
-    folder = out or _new_folder(prepared.loaded.task.name, name, strategy, config.seed)
+    others = named(also, strategy)
+    for name in others:
+        prepare(under(config, name))
+    prepared = prepare(config)
+    called = None if prepared.scenario is None else prepared.scenario.name
+    folder = out or _new_folder(prepared.loaded.task.name, called, strategy, config.seed)
     make_folder(folder)
     page = folder / "index.html"
     with _shown(folder, live) as stay:
         with alone(folder):
-            demonstrations, used = (
-                memory_of(config, quiet) if needs_memory(config) else (None, None)
-            )
-            recorder = RunRecorder(folder, page=str(page))
-            with logging_to(log) as logs, ProgressLine(quiet=quiet) as line:
-                record = run_episode(prepared, demonstrations, [recorder, line, *logs], used)
-            if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
-                write_record(folder, record, page=str(page))
-            write_page(record, page)
-            if eyes := other_eyes(demonstrations or (), provenance_of(record, "perception")):
+            lent = memory_of(config, quiet) if needs_memory(config) else (None, None)
+            with logging_to(log) as logs:
+                record = recorded(prepared, folder, lent, quiet, also=logs)
+            found = run_beside(config, folder, record, others, lent, quiet=quiet) if others else ()
+            if found:
+                write_page(record, page, folder)
+            if eyes := other_eyes(lent[0] or (), provenance_of(record, "perception")):
                 print(f"forestall: {eyes}", file=sys.stderr)
             data = record_to_json(read_record(folder), page=str(page))
         if as_json:
-            print(json.dumps(data, indent=2), flush=True)
+            more = {"beside": beside_json(found, folder)} if others else {}
+            print(json.dumps({**data, **more}, indent=2), flush=True)
         else:
             _summary(data)
+            if found:
+                told(record, found)
+            print(page)
         stay()
     return _code(record)
 
@@ -190,4 +212,3 @@ def _summary(data: dict[str, Any]) -> None:
         f"states: {shown(str(data['perception']['state_estimator']))}",
         soft_wrap=True,
     )
-    print(data["page"], file=sys.stdout)

@@ -59,7 +59,7 @@ def graph_svg(
         done: whether the subtask of the graphs is over; otherwise it comes next.
         standalone: carry namespace and style sheet along, for a file of its own.
         about: what tells this drawing from the others on a page, for those who hear it.
-        placed: ids of nodes that a picture beside it shows: they can be pointed at.
+        placed: ids of nodes that a picture or a 3D view beside it shows: they can be pointed at.
 
     Returns:
         One `<svg>` element. Both sides of a pair come out with the same size and the same rows.

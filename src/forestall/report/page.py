@@ -14,7 +14,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from forestall.files import replace_file
+from forestall.records.beside import beside
 from forestall.records.derived import in_words
+from forestall.report.beside_view import COLUMNS
+from forestall.report.figure_style import colours_css, inline_svg
 from forestall.report.graph_svg import graph_css
 from forestall.report.page_view import Page, page_view, status_sign
 from forestall.report.words import duration
@@ -31,15 +34,16 @@ def page_html(record: EpisodeRecord, folder: Path | None = None, *, home: str = 
 
     Args:
         record: of the run.
-        folder: where the pictures of a record lie that was read.
+        folder: where the pictures of a record lie that was read, and runs beside it.
         home: a link to all runs, where somebody serves the page; a file has none.
     """
-    page = page_view(record, folder, MOST_BYTES)
+    others = () if folder is None else beside(folder, record)
+    page = page_view(record, folder, MOST_BYTES, others)
     text = _rendered(page, home)
     size = len(text.encode("utf-8"))
     if size > MOST_BYTES:
         room = MOST_BYTES - (size - _pictures_size(page))
-        text = _rendered(page_view(record, folder, max(_LEAST_PICTURES, room)), home)
+        text = _rendered(page_view(record, folder, max(_LEAST_PICTURES, room), others), home)
     return text
 
 
@@ -56,15 +60,26 @@ def _rendered(page: Page, home: str) -> str:
             page=page,
             record=page.record,
             home=home,
-            style=Markup(template("page.css") + graph_css()),
+            columns=COLUMNS,
+            timeline=_timeline(page),
+            style=Markup(template("page.css") + graph_css() + colours_css()),
             script=Markup(page_script()),
         )
     )
 
 
+def _timeline(page: Page) -> Markup:
+    """The drawing of the run and those beside it, "" where there are none."""
+    if page.beside is None:
+        return Markup("")
+    strategies = ", ".join(row.cells[0] for row in page.beside.rows)
+    words = f"what happened when with the strategies {strategies}; the table has the numbers"
+    return Markup(inline_svg(page.beside.drawing, "beside", words))
+
+
 def page_script() -> str:
     """The script that every page carries; whoever serves pages allows this one alone."""
-    return template("page.js")
+    return template("page.js") + template("space.js")
 
 
 def template(name: str) -> str:
@@ -96,7 +111,7 @@ def write_page(record: EpisodeRecord, path: Path | str, folder: Path | None = No
     Args:
         record: pictures come from its observations; where there are none the page says so.
         path: the HTML file; its folder is made when it is not there.
-        folder: of a record that was read from one; its pictures are there.
+        folder: of the run; pictures of a record that was read are there, and runs beside it.
 
     Returns:
         The path.

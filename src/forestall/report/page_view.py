@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,12 @@ from forestall.records.derived import (
 from forestall.records.exchanges import Taken, exchanges_of, taken
 from forestall.records.pictures import Picture, page_picture, rgb_of
 from forestall.records.plain import plain
+from forestall.report.beside_view import BesideView, beside_view
 from forestall.report.drawn import Drawn, drawn
 from forestall.report.exchange_view import ExchangeView, exchange_views
 from forestall.report.graph_svg import graph_svg
 from forestall.report.in_picture import Framed, framed
+from forestall.report.space import space_of
 from forestall.report.story import story
 from forestall.types.episode import (
     BoundaryRecord,
@@ -85,6 +87,7 @@ class Card:
     views: tuple[Picture, ...]
     thumb: Picture | None
     boxes: tuple[Framed, ...]
+    space: Mapping[str, Any] | None
     bars: tuple[Bar, ...]
     threshold_percent: float
     observed_svg: str
@@ -116,15 +119,22 @@ class Page:
     model: Taken
     phases: tuple[Bar, ...]
     provenance: tuple[tuple[str, str], ...]
+    beside: BesideView | None
 
 
-def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -> Page:
+def page_view(
+    record: EpisodeRecord,
+    folder: Path | None,
+    pictures_bytes: int,
+    others: Sequence[EpisodeRecord] = (),
+) -> Page:
     """Everything that the template needs.
 
     Args:
         record: of the run.
         folder: where its pictures lie.
         pictures_bytes: how large all pictures together may be.
+        others: of the same start under other strategies.
     """
     all_moments = moments(record)
     frames = sum(
@@ -142,7 +152,7 @@ def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -
         record=record,
         cards=cards,
         heading=_heading(all_moments),
-        story=story(record),
+        story=story(record, others),
         alarms=alarms(record),
         places={c.moment.position: c.number for c in cards if c.moment.position is not None},
         legend=_legend(all_moments),
@@ -158,6 +168,7 @@ def page_view(record: EpisodeRecord, folder: Path | None, pictures_bytes: int) -
             for name, seconds in sorted(record.compute_s, key=lambda x: (-x[1], x[0]))
         ),
         provenance=tuple((str(k), _words(v)) for k, v in record.provenance),
+        beside=beside_view(record, others),
     )
 
 
@@ -182,9 +193,12 @@ def _card(
     observation = None if boundary is None else boundary.observation
     picture, views, thumb = _pictures(observation, budget, folder)
     bars, threshold = _bars(verdict)
+    how = drawn(record.task.domain)
     boxes = () if boundary is None or picture is None else _boxes(boundary)
+    space = None if boundary is None else space_of(boundary, how)
     about = f"moment {number}, {in_words(moment.when)} {moment.subtask}"
-    observed, expected = _graphs(moment, about, drawn(record.task.domain), boxes)
+    placed = {b.node for b in boxes} | {b[0] for b in (space or {}).get("boxes", ())}
+    observed, expected = _graphs(moment, about, how, placed)
     outcome = None if boundary is None else outcome_of(boundary)
     rows: tuple[PlanRow, ...] = ()
     if boundary is not None and moment.after is not None:
@@ -201,6 +215,7 @@ def _card(
         views=views,
         thumb=thumb,
         boxes=boxes,
+        space=space,
         bars=bars,
         threshold_percent=threshold,
         observed_svg=observed,
@@ -265,12 +280,12 @@ def _bars(verdict: Verdict | None) -> tuple[tuple[Bar, ...], float]:
     )
 
 
-def _graphs(moment: Moment, about: str, how: Drawn, boxes: Sequence[Framed]) -> tuple[str, str]:
+def _graphs(moment: Moment, about: str, how: Drawn, placed: Collection[str]) -> tuple[str, str]:
     boundary = moment.boundary
     if boundary is None:
         return "", ""
     verdict, done = boundary.verdict, moment.when is not When.BEFORE
-    seen, placed = boundary.scoped, {b.node for b in boxes}
+    seen = boundary.scoped
     if verdict is None or verdict.nearest is None:
         return graph_svg(
             seen, None, (), (), "observed", how, done=done, about=about, placed=placed

@@ -108,7 +108,7 @@ def timelines(lanes: Sequence[Lane]) -> bytes:
         axes.grid(False, axis="y")
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("simulated seconds")
-        key(figure, _timeline_key())
+        key(figure, _timeline_key(lanes))
         return svg_bytes(figure)
 
 
@@ -122,19 +122,23 @@ _SIGNS = (
 """What is marked on a lane: its name, marker, colour and size."""
 
 
-def _lane(axes: Axes, y: float, lane: Lane, longest: float) -> None:
-    axes.plot([0, lane.end_s], [y, y], color=colour("line"), linewidth=2, zorder=1)
-    seen: tuple[tuple[float, ...], ...] = (
+def _seen(lane: Lane) -> tuple[tuple[float, ...], ...]:
+    """The times of what is marked on a lane, in the order of `_SIGNS`."""
+    return (
         lane.ticks,
         () if lane.known_s is None else (lane.known_s,),
         lane.alarms,
         lane.replans,
         () if lane.harmed_s is None else (lane.harmed_s,),
     )
+
+
+def _lane(axes: Axes, y: float, lane: Lane, longest: float) -> None:
+    axes.plot([0, lane.end_s], [y, y], color=colour("line"), linewidth=2, zorder=1)
     raised = (0.0, -0.26, 0.24, 0.24, 0.0)
     shifted = (0.0, 0.0, 0.0, 0.012 * longest, 0.0)
     for times, (_, marker, role, size), up, right in zip(
-        seen, _SIGNS, raised, shifted, strict=True
+        _seen(lane), _SIGNS, raised, shifted, strict=True
     ):
         axes.plot(
             [t + right for t in times],
@@ -167,9 +171,11 @@ def _lane(axes: Axes, y: float, lane: Lane, longest: float) -> None:
     )
 
 
-def _timeline_key() -> list[Artist]:
+def _timeline_key(lanes: Sequence[Lane]) -> list[Artist]:
+    """What the signs mean that are there."""
     from matplotlib.lines import Line2D
 
+    there = [any(times) for times in zip(*(_seen(lane) for lane in lanes), strict=True)]
     return [
         Line2D(
             *([], []),
@@ -180,7 +186,8 @@ def _timeline_key() -> list[Artist]:
             linestyle=NOTHING,
             label=name,
         )
-        for name, marker, role, size in _SIGNS
+        for (name, marker, role, size), shown in zip(_SIGNS, there, strict=True)
+        if shown
     ]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from forestall.records.beside import ALONE
 from forestall.records.derived import Alarm, alarms, done_before, in_words
 from forestall.report.words import duration
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
@@ -17,14 +18,30 @@ _ENDS = re.compile(r"(?<=[.!?])\s+(?=[A-Z\d])")
 _MOST_WORDS = 400
 
 
-def story(record: EpisodeRecord) -> str:
-    """One sentence about a run, finished or not."""
+def story(record: EpisodeRecord, others: Sequence[EpisodeRecord] = ()) -> str:
+    """One sentence about a run, finished or not, and one about the same start without a monitor.
+
+    Args:
+        record: of the run.
+        others: of the same start under other strategies; the first is told of.
+    """
     found = alarms(record)
     if not record.boundaries and not record.executed:
         begun = "The run ended before its first subtask"
     else:
         begun = _seen(record, found) if found else _unseen(record)
-    return f"{begun}; {_end(record)}."
+    told = [f"{begun}; {_end(record)}.", *(_otherwise(record, other) for other in others[:1])]
+    return " ".join(told)
+
+
+def _otherwise(record: EpisodeRecord, other: EpisodeRecord) -> str:
+    """How the same start ended under another strategy."""
+    how = "without a monitor" if other.strategy == ALONE else f"with the strategy {other.strategy}"
+    sooner = record.simulated_s - other.simulated_s
+    than = ""
+    if record.success and other.success and abs(sooner) >= 0.05:
+        than = f", {duration(abs(sooner))} {'sooner' if sooner > 0 else 'later'}"
+    return f"Run once more {how}, {_end(other)}{than}."
 
 
 def _seen(record: EpisodeRecord, found: Sequence[Alarm]) -> str:

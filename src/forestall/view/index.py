@@ -13,20 +13,23 @@ import os
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from forestall.config import cache_dir
 from forestall.errors import FileFormatError, ForestallError
+from forestall.experiments.folder import EFFORT, episodes_in
 from forestall.experiments.stored import ABOUT, PACKED, ROWS
 from forestall.files import replace_file
 from forestall.reading.documents import read_json
 from forestall.reading.files import read_bytes, read_packed_text
+from forestall.records.beside import BESIDE_NAME
 from forestall.records.record import LINES_NAME, RECORD_NAME
 from forestall.view.rows import RunRow, read_row
 
-CACHE_FORMAT = 1
+CACHE_FORMAT = 2
 
 _MOST_DEEP = 6
 _PAGE = "index.html"
@@ -45,6 +48,7 @@ class ExperimentRow:
         split: that it was run on, "" where it says none.
         episodes: how many are finished.
         page: whether there is a page of it.
+        wanted: how many episodes were asked for; 0 where nobody wrote that down.
     """
 
     place: str
@@ -53,6 +57,7 @@ class ExperimentRow:
     split: str
     episodes: int
     page: bool
+    wanted: int = 0
 
     @property
     def name(self) -> str:
@@ -136,6 +141,8 @@ def _sources(folder: Path, place: str, deep: int) -> Iterator[tuple[str, Path]]:
     own = next((n for n in (RECORD_NAME, LINES_NAME) if n in inside), None)
     if own is not None:
         yield place, folder / own
+        if BESIDE_NAME in inside and deep:
+            yield from _sources(folder / BESIDE_NAME, _joined(place, BESIDE_NAME), deep - 1)
         return
     if ABOUT in inside:
         rows = next((n for n in (ROWS, ROWS + PACKED) if n in inside), ABOUT)
@@ -144,17 +151,25 @@ def _sources(folder: Path, place: str, deep: int) -> Iterator[tuple[str, Path]]:
         return
     for name in sorted(inside):
         if not name.startswith(".") and inside[name].is_dir(follow_symlinks=False):
-            yield from _sources(folder / name, f"{place}/{name}" if place else name, deep - 1)
+            yield from _sources(folder / name, _joined(place, name), deep - 1)
+
+
+def _joined(place: str, name: str) -> str:
+    return f"{place}/{name}" if place else name
 
 
 def _stamp(source: Path) -> list[int] | None:
-    """When the file was changed and how large it is; also whether an experiment has a page."""
+    """When the file was changed, how large it is, and what else tells of an experiment."""
     try:
         found = source.stat()
     except OSError:
         return None
-    page = source.name.startswith((ROWS, ABOUT)) and (source.parent / _PAGE).is_file()
-    return [found.st_mtime_ns, found.st_size, int(page), int(source.name == RECORD_NAME)]
+    page, effort = False, 0
+    if source.name.startswith((ROWS, ABOUT)):
+        page = (source.parent / _PAGE).is_file()
+        with suppress(OSError):
+            effort = (source.parent / EFFORT).stat().st_size
+    return [found.st_mtime_ns, found.st_size, int(page), int(source.name == RECORD_NAME), effort]
 
 
 def _read(place: str, source: Path, changed_s: float) -> RunRow | ExperimentRow:
@@ -168,8 +183,11 @@ def _read(place: str, source: Path, changed_s: float) -> RunRow | ExperimentRow:
         episodes = _episodes(source)
     except (FileFormatError, OSError) as error:
         kind, episodes = str(error), 0
+    wanted = 0
+    with suppress(FileFormatError, OSError):  # results of some kinds are not counted ahead
+        wanted = sum(a.episodes for a in episodes_in(source.parent).asked())
     page = (source.parent / _PAGE).is_file()
-    return ExperimentRow(place, changed_s, kind, split, episodes, page)
+    return ExperimentRow(place, changed_s, kind, split, episodes, page, wanted)
 
 
 def _episodes(source: Path) -> int:
@@ -204,7 +222,7 @@ def _cached(folder: Path) -> dict[str, tuple[list[int], RunRow | ExperimentRow]]
 
 def _keep(folder: Path, kept: Mapping[str, tuple[list[int], RunRow | ExperimentRow]]) -> None:
     rows: dict[str, Any] = {
-        place: [stamp, "run" if isinstance(row, RunRow) else "experiment", asdict(row)]
+        place: [stamp, "run" if isinstance(row, RunRow) else "experiment", _plain(row)]
         for place, (stamp, row) in kept.items()
     }
     try:
@@ -213,3 +231,7 @@ def _keep(folder: Path, kept: Mapping[str, tuple[list[int], RunRow | ExperimentR
         replace_file(file, json.dumps({"format": CACHE_FORMAT, "rows": rows}).encode())
     except (ForestallError, OSError, ValueError):
         return
+
+
+def _plain(row: RunRow | ExperimentRow) -> dict[str, Any]:
+    return {name: getattr(row, name) for name in row.__slots__}

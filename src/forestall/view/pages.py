@@ -18,6 +18,7 @@ from urllib.parse import quote, urlencode
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from forestall.report.words import duration
+from forestall.view.batch import Batch
 from forestall.view.choosing import Choice
 from forestall.view.comparing import Sides
 from forestall.view.index import ExperimentRow
@@ -41,7 +42,7 @@ OUTCOME_LOOKS = {
 def index_page(
     folder: Path,
     choice: Choice,
-    experiments: Sequence[ExperimentRow],
+    experiments: Sequence[tuple[ExperimentRow, bool]],
     total: int,
     version: int,
 ) -> str:
@@ -50,7 +51,7 @@ def index_page(
     Args:
         folder: that is viewed.
         choice: the runs that are shown.
-        experiments: all of them.
+        experiments: all of them, each with whether it is at work.
         total: how many runs there are.
         version: of the index; the page asks what has happened since.
     """
@@ -80,6 +81,18 @@ def live_page(place: str, progress: Progress, outcome: Outcome, offset: int) -> 
         "live", place=place, progress=progress, outcome=outcome,
         follow=follow if outcome is Outcome.RUNNING else "",
     )  # fmt: skip
+
+
+def batch_page(row: ExperimentRow, batch: Batch, busy: bool) -> str:
+    """An experiment that is not over, as far as it has come.
+
+    Args:
+        row: of it.
+        batch: its newest episodes, and what was asked for.
+        busy: whether it is still at work.
+    """
+    follow = f"/events?{urlencode({'experiment': _bytes(row.place), 'seen': batch.size})}"
+    return _render("batch", row=row, batch=batch, busy=busy, follow=follow if busy else "")
 
 
 def compare_page(places: tuple[str, str], sides: Sides) -> str:

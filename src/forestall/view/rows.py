@@ -11,7 +11,7 @@ import re
 import socket
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,12 @@ from forestall.view.live import happened
 
 _BOUNDARIES = b'\n "boundaries": '
 _CHUNK = 2**15
+_LISTED = frozenset({"alarms", "executed"})
+_WANTED = _LISTED | {
+    *("kind", "format", "complete", "task", "title", "scenario", "strategy", "seed"),
+    *("success", "replans", "simulated_s"),
+}
+"""Keys of a record that a row is made of; of lists it is the length."""
 _LOOKS_UP = 3
 _QUIET_S = 600.0
 _PROCESS = re.compile(r"^process (\d+) on (.+), since ")
@@ -78,10 +84,6 @@ class RunRow:
     simulated_s: float = 0.0
     problem: str = ""
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
-
     @property
     def name(self) -> str:
         """What it is called where it cannot be read."""
@@ -116,14 +118,14 @@ def outcome_of(row: RunRow, folder: Path) -> Outcome:
     if row.problem:
         return Outcome.UNREADABLE
     if not row.over:
-        return Outcome.RUNNING if _at_work(folder, row.changed_s) else Outcome.BROKEN_OFF
+        return Outcome.RUNNING if at_work(folder, row.changed_s) else Outcome.BROKEN_OFF
     if row.success is None:
         return Outcome.NOT_SCORED
     return Outcome.SUCCEEDED if row.success else Outcome.FAILED
 
 
 def _head(source: Path) -> Any:
-    """Everything of a record before its boundaries."""
+    """What the index asks of a record before its boundaries, or all of that."""
     data = b""
     with source.open("rb") as file:
         while _BOUNDARIES not in data[-len(_BOUNDARIES) - _CHUNK :]:
@@ -133,8 +135,38 @@ def _head(source: Path) -> Any:
             data += more
             if len(data) > MOST_RECORD_BYTES:
                 raise FileFormatError(f"{source} is larger than a record may be")
-    head = data[: data.index(_BOUNDARIES)].rstrip().removesuffix(b",")
-    return parse_json(head.decode("utf-8", "replace") + "}")
+    head = data[: data.index(_BOUNDARIES)].rstrip().removesuffix(b",").decode("utf-8", "replace")
+    brief = _brief(head)
+    return parse_json(f"{head}}}") if brief is None else brief
+
+
+def _brief(head: str) -> dict[str, Any] | None:
+    """The keys that a row is made of, from a record with one key a line, as ours are written.
+
+    Most of a head is of no use here, and reading it is most of what a first view takes. None where
+    the lines are not as expected, and everything is to be read.
+    """
+    opening, *lines = head.split("\n")
+    found: dict[str, str] = {}
+    counts: dict[str, int] = {}
+    key = ""
+    for line in lines:
+        if line.startswith("  ") and found.get(key) == "[":  # one of a list
+            counts[key] += 1
+        elif line.startswith(' "'):
+            key, colon, value = line[2:].partition('": ')
+            if not colon or key in found:
+                return None
+            found[key], counts[key] = value.removesuffix(","), 0
+        elif line not in (" ]", " ],"):
+            return None
+    if opening != "{" or not found.keys() >= _WANTED:
+        return None
+    texts = (f'"{k}": {found[k]}' for k in _WANTED - _LISTED)
+    listed = {k: [None] * counts[k] for k in _LISTED if found[k] in ("[", "[]")}
+    return (
+        None if len(listed) < len(_LISTED) else {**parse_json(f"{{{', '.join(texts)}}}"), **listed}
+    )
 
 
 def _whole(place: str, data: Any, changed_s: float) -> RunRow:
@@ -187,7 +219,7 @@ def _time(event: Mapping[str, Any]) -> float:
     return float(told) if isinstance(told, int | float) else 0.0
 
 
-def _at_work(folder: Path, changed_s: float) -> bool:
+def at_work(folder: Path, changed_s: float) -> bool:
     """Whether somebody still writes: the holder of the folder or of one above it lives.
 
     Where nobody holds one, or who does is on another machine, what was written lately counts.

@@ -21,24 +21,27 @@ from urllib.parse import parse_qs, unquote_to_bytes, urlsplit
 
 from forestall.errors import InputError
 from forestall.reading.files import inside, read_bytes
+from forestall.records.beside import records_beside
 from forestall.records.record import LINES_NAME, RECORD_NAME, read_record
 from forestall.report.experiment_page import experiment_script
 from forestall.report.page import page_html, page_script
 from forestall.serving import POLICY, PageHandler, PageServer, Refused
+from forestall.view.batch import batch_of, size_of
 from forestall.view.choosing import Shown, choose
 from forestall.view.comparing import compare
-from forestall.view.index import Index
+from forestall.view.index import ExperimentRow, Index
 from forestall.view.live import happened, progress
 from forestall.view.pages import (
     ASSETS,
     asset,
+    batch_page,
     compare_page,
     index_page,
     live_page,
     message_page,
     run_link,
 )
-from forestall.view.rows import Outcome, RunRow, outcome_of, source_of
+from forestall.view.rows import Outcome, RunRow, at_work, outcome_of, source_of
 
 PORT = 8766
 _LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -71,7 +74,7 @@ class ViewServer(PageServer):
         self.local = host in _LOCAL
         self.stopping = threading.Event()
         self._lock = threading.Lock()
-        self._pages: OrderedDict[tuple[str, int, int], str] = OrderedDict()
+        self._pages: OrderedDict[tuple[str, tuple[tuple[int, int], ...]], str] = OrderedDict()
         super().__init__(host, port, _Handler)
 
     def shutdown(self) -> None:
@@ -86,8 +89,9 @@ class ViewServer(PageServer):
             FileFormatError: its record is damaged.
         """
         folder = self.index.folder_of(place)
-        stat = (source_of(folder) or folder).stat()
-        key = (place, stat.st_mtime_ns, stat.st_size)
+        sources = (source_of(folder) or folder, *records_beside(folder))
+        stats = tuple((s.st_mtime_ns, s.st_size) for s in (source.stat() for source in sources))
+        key = (place, stats)
         with self._lock:
             found = self._pages.get(key)
         if found is None:
@@ -154,13 +158,16 @@ class _Handler(PageHandler):
         found = index.now()
         runs = [Shown(r, outcome_of(r, index.folder_of(r.place))) for r in found.runs.values()]
         choice = choose(runs, asked)
-        experiments = list(found.experiments.values())
+        experiments = [(e, self._works(e)) for e in found.experiments.values()]
         self.page(index_page(index.folder, choice, experiments, len(runs), found.version))
 
     def _run(self, rest: str) -> None:
         place, pictures, name = f"/{rest}".rpartition("/images/")
         if pictures and rest.removesuffix("/") not in self.server.index.now().runs:
             self._file(self._known(place[1:]).place, f"images/{name}")
+            return
+        if rest.endswith("/index.html"):  # as pages of folders lead to each other
+            self._go(run_link(self._known(rest.removesuffix("/index.html")).place))
             return
         row = self._known(rest.removesuffix("/"))
         folder = self.server.index.folder_of(row.place)
@@ -180,7 +187,11 @@ class _Handler(PageHandler):
             self._go(run_link(place.removesuffix("/index.html")))
             return
         if place in found.experiments:
+            row = found.experiments[place]
             file = self.server.index.folder_of(place) / "index.html"
+            if self._works(row) or (row.wanted > row.episodes and not file.is_file()):
+                self.page(batch_page(row, batch_of(file.parent), self._works(row)))
+                return
             if not file.is_file():
                 raise Refused(
                     HTTPStatus.NOT_FOUND,
@@ -194,6 +205,11 @@ class _Handler(PageHandler):
                 self._file(parent, rest[len(parent) + bool(parent) :])
                 return
         raise Refused(HTTPStatus.NOT_FOUND, "There is no such experiment in this folder.")
+
+    def _works(self, row: ExperimentRow) -> bool:
+        """Whether episodes of an experiment are still to come."""
+        folder = self.server.index.folder_of(row.place)
+        return row.wanted > row.episodes and at_work(folder, row.changed_s)
 
     def _file(self, place: str, name: str) -> None:
         """A file inside the folder of a run or an experiment."""
@@ -234,8 +250,11 @@ class _Handler(PageHandler):
         """Tell when the index, or a run, is no longer what the page has seen."""
         said = asked.get("seen", "")
         seen = int(said) if said.isascii() and said.isdigit() and len(said) < 16 else 0
-        place = asked.get("run")
-        state = self._version if place is None else self._written(self._known(place))
+        state = self._version
+        if "run" in asked:
+            state = self._written(self._known(asked["run"]))
+        elif "experiment" in asked:
+            state = self._finished(asked["experiment"])
         self.close_connection = True
         self.send_response(HTTPStatus.OK)
         self.headers_of(None)
@@ -267,6 +286,19 @@ class _Handler(PageHandler):
                 return (folder / LINES_NAME).stat().st_size if self._is_busy(row) else -1
             except OSError:
                 return -1
+
+        return size
+
+    def _finished(self, place: str) -> Callable[[], int]:
+        """Bytes of episodes so far; another number when the experiment is no longer at work."""
+        if place not in self.server.index.now().experiments:
+            raise Refused(HTTPStatus.NOT_FOUND, "There is no such experiment in this folder.")
+
+        def size() -> int:
+            found = self.server.index.now().experiments.get(place)
+            if found is None or not self._works(found):
+                return -1
+            return size_of(self.server.index.folder_of(place))
 
         return size
 

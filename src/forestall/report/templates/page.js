@@ -34,7 +34,7 @@
 
   function busy(target) {
     var scroll = target.closest && target.closest(".scroll");
-    return (scroll && scroll.scrollWidth > scroll.clientWidth) ||
+    return (scroll && scroll.scrollWidth > scroll.clientWidth) || target.closest(".space") ||
       /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName);
   }
 
@@ -66,16 +66,16 @@
   show();
 
   function point(event) {
-    var node = event.target.closest && event.target.closest(".fg-placed");
+    var node = event.target.closest && event.target.closest("article [data-node]");
+    if (!node) { return; }
     var on = event.type === "mouseover" || event.type === "focusin";
-    var card = node && node.closest("article");
-    var seen = card && card.querySelector(".seen");
-    if (!seen) { return; }
-    seen.classList.toggle("pointing", on);
-    seen.querySelectorAll(".box").forEach(function (frame) {
-      frame.classList.toggle("pointed",
-        on && frame.getAttribute("data-node") === node.getAttribute("data-node"));
+    var card = node.closest("article"), name = node.getAttribute("data-node");
+    var seen = card.querySelector(".seen");
+    if (seen) { seen.classList.toggle("pointing", on); }
+    card.querySelectorAll(".box, .fg-placed").forEach(function (one) {
+      one.classList.toggle("pointed", on && one.getAttribute("data-node") === name);
     });
+    card.dispatchEvent(new CustomEvent("pointed", { detail: on ? name : null }));
   }
   ["mouseover", "mouseout", "focusin", "focusout"].forEach(function (kind) {
     document.addEventListener(kind, point);
