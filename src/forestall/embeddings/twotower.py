@@ -23,6 +23,7 @@ from forestall.embeddings.crops import INPUT_PIXELS, crops, whole
 from forestall.embeddings.remembered import CropRows, TextRows, Vectors
 from forestall.embeddings.tokens import tokens, words
 from forestall.errors import FileFormatError, InputError, ModelFileError
+from forestall.extras import how
 from forestall.reading.documents import read_json
 from forestall.reading.fields import Field
 from forestall.reading.files import read_bytes
@@ -222,7 +223,7 @@ def _open(path: Path, sha256: str | None, threads: int) -> Any:
     except ImportError as error:
         raise ModelFileError(
             f"the encoder needs onnxruntime, which cannot be imported ({error}): "
-            "pip install onnxruntime"
+            f"{how('perception')}"
         ) from error
     from onnxruntime.capi import onnxruntime_pybind11_state as states
 
