@@ -29,10 +29,11 @@ class SeeingFlags:
     """What a scene is seen with.
 
     Args:
-        world: where the robot acts: a name, or package.module:Class.
+        world: where the robot acts: kitchen, symbolic, ai2thor, or package.module:Class.
         sensor: what the robot looks through: perfect, realsense, kinect, tof or realistic (stereo
             noise, pose and mask errors, no identities).
-        domain: what the task is read in: a name, or a file (.toml, .pddl); its own by default.
+        domain: what the task is read in: household, bench, ai2thor, or a file (.toml, .pddl); its
+            own by default.
         states: where object states come from: learned (pixels, by the shipped encoder), clip
             (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
         feature: what a node's feature encodes: text, parts (category and states) or image.
@@ -99,9 +100,9 @@ class RunFlags(ComparingFlags):
     """Who judges and steps in, besides.
 
     Args:
-        strategy: when a run may be interrupted: none, proactive, online, online-scene, post-hoc;
-            watch lets every detector judge and never interrupts.
-        detector: of a strategy that steps in: scene-graph, objects, caption or image.
+        strategy: when a run may be interrupted: none, retry-once, plan-check, proactive, online,
+            online-scene, post-hoc; watch lets every detector judge and never interrupts.
+        detector: of a strategy that steps in: scene-graph, preconditions, objects, caption, image.
         threshold: alarm when no demonstration reaches this score.
         llm: the language model that explains and plans: an endpoint's address, a model's name,
             replay:FILE (the answers of an earlier run), record:FILE (write them down).

@@ -14,7 +14,9 @@ def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
     """List the parts of a run by kind, or one kind's with every option and its default.
 
     Args:
-        kind: only this kind, e.g. detector; with options.
+        kind: only this kind, with options: world, sensor, domain, segmenter, states, perceiver,
+            text-encoder, image-encoder, captioner, store, retriever, detector, expectations, llm,
+            reasoner, replanner, validator, limit, strategy.
         as_json: print JSON, always with options.
     """
     from forestall.assembly.registry import TABLES, known, lacking, table
