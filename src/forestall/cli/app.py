@@ -21,7 +21,7 @@ from forestall.cli.flags import spelt
 from forestall.cli.importing import import_
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
-from forestall.cli.page import page
+from forestall.cli.page import gallery, page
 from forestall.cli.parts import parts
 from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
@@ -36,7 +36,7 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, view, page, tasks, scenarios, parts, check, compare, calibrate, doctor):
+for command in (run, view, page, gallery, tasks, scenarios, parts, check, compare, calibrate, doctor):
     app.command(command)
 app.command(import_, name="import")
 app.command(demos)

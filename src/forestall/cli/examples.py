@@ -8,6 +8,7 @@ EXAMPLES: Mapping[str, str] = {
     "run": "run heat-potato --scenario microwave-occupied",
     "view": "view runs",
     "page": "page runs/heat-potato-undisturbed-proactive-0-20260101-120000",
+    "gallery": "gallery shown runs/microwave-occupied runs/pan-dirty",
     "tasks": "tasks --json",
     "tasks check": "tasks check fetch-ladle.toml",
     "scenarios": "scenarios --task heat-potato --set robofail",
