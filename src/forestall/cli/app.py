@@ -36,7 +36,19 @@ app = App(
     version=forestall.__version__,
     suppress_keyboard_interrupt=False,
 )
-for command in (run, view, page, gallery, tasks, scenarios, parts, check, compare, calibrate, doctor):
+for command in (
+    run,
+    view,
+    page,
+    gallery,
+    tasks,
+    scenarios,
+    parts,
+    check,
+    compare,
+    calibrate,
+    doctor,
+):
     app.command(command)
 app.command(import_, name="import")
 app.command(demos)

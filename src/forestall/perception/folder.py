@@ -369,9 +369,10 @@ def _write_frame(
         arrays: dict[str, Any] = {f"m{i}": d.mask for i, d in enumerate(frame.detections)}
         np.savez_compressed(folder / masks, **arrays)
         for key, d in zip(arrays, frame.detections, strict=True):
-            detections.append(
-                {"category": d.category, "instance": d.instance, "score": d.score, "mask": key}
-            )
+            own = {"category": d.category, "instance": d.instance, "score": d.score, "mask": key}
+            if d.states and (d.instance or not tail):  # of several frames states need an instance
+                own["states"] = dict(d.states)
+            detections.append(own)
     elif frame.instance_ids is not None:
         masks = f"masks{tail}.png"
         Image.fromarray((frame.instance_ids + 1).astype(np.uint16)).save(folder / masks)
@@ -384,7 +385,7 @@ def _write_frame(
     for detection in detections:
         known = states.get(str(detection["instance"]))
         if known:
-            detection["states"] = dict(known)
+            detection["states"] = {**(detection.get("states") or {}), **known}  # type: ignore[dict-item]
     k = frame.intrinsics
     return {
         "intrinsics": {"fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy},
