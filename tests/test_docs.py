@@ -79,7 +79,7 @@ def test_the_page_for_ones_own_robot_runs_and_prints_what_it_says(
 
 
 @pytest.mark.parametrize(
-    ("name", "codes"), [("from-rgbd", [0, 1]), ("your-domain", [0, 0, 0, 0, CODE])]
+    ("name", "codes"), [("from-rgbd", [0, 1]), ("your-domain", [0, 0, 0, 0, 0])]
 )
 def test_a_page_that_is_gone_through_in_order_prints_what_it_says(
     name: str,
