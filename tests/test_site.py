@@ -39,9 +39,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_a_load_is() -> None:
     loads = ['<script src="https://a.b/c.js">', "<link rel=x href=//a.b/c>", "@import 'http://a.b'"]
     assert all(LOADED.search(text) for text in (*loads, "url(https://a.b/c.woff)"))
-    assert not LOADED.search(
-        '<a href="https://arxiv.org/abs/2508.11286"><img src="a.jpg">'
-    )
+    assert not LOADED.search('<a href="https://arxiv.org/abs/2508.11286"><img src="a.jpg">')
 
 
 def test_no_page_loads_anything_from_a_network(site: Path) -> None:
