@@ -45,7 +45,7 @@ def test_a_run_without_such_an_alarm_is_named(
 ) -> None:
     write_record(tmp_path / "quiet", records.unjudged_record())
     assert call(["gallery", str(tmp_path / "docs"), str(tmp_path / "quiet")]) == 2
-    assert "no alarm of this run changed its plan" in capsys.readouterr().err
+    assert "this run has no alarm" in capsys.readouterr().err
     assert not (tmp_path / "docs").exists()
     assert call(["gallery", str(tmp_path / "docs")]) == 2
     assert "no run was named" in capsys.readouterr().err

@@ -26,7 +26,7 @@ def gallery(out: Path, /, *runs: Path) -> int:
 
     Args:
         out: the folder to write gallery.md and its pictures to.
-        runs: folders of runs in which an alarm changed the plan, in the order of the page.
+        runs: folders of runs in which there was an alarm, in the order of the page.
     """
     from forestall.errors import InputError
     from forestall.report.gallery import write_gallery

@@ -1,7 +1,7 @@
 """Runs that went wrong, as one Markdown page with a picture of each.
 
 Called by the command line; calls `records/derived.py` and `in_picture.py`. Each run is shown at the
-alarm that changed its plan, and nothing is said but what its record says.
+alarm that changed its plan, else at its first, and nothing is said but what its record says.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _FRAME = (226, 60, 40)
 _HEAD = """# Failures, in pictures
 
 Each of these runs would have failed. Every picture is what the robot saw when forestall stopped it,
-with a frame around what the alarm speaks about; the text is what it told its owner, and the plan is
-what it did instead. Everything here comes from the records of the runs, by the command at the end.
+with a frame around what the alarm speaks about; the text is what it told its owner, and the plan,
+where there is one, is what it did instead. Everything here comes from the records of the runs, by the command at the end.
 """
 
 
@@ -46,7 +46,7 @@ def write_gallery(folder: Path, runs: Sequence[Path]) -> Path:
         The page.
 
     Raises:
-        InputError: a run without a record, or one in which no alarm changed the plan.
+        InputError: a run without a record, or one without an alarm.
     """
     shown = [_shown(run, read_record(run)) for run in runs]
     make_folder(folder / PICTURES)
@@ -61,9 +61,10 @@ def write_gallery(folder: Path, runs: Sequence[Path]) -> Path:
 
 def _shown(run: Path, record: EpisodeRecord) -> tuple[str, str, bytes]:
     """Name, section and picture of a run."""
-    alarm = next((a for a in alarms(record) if a.replanned), None)
+    every = alarms(record)
+    alarm = next((a for a in every if a.replanned), every[0] if every else None)
     if alarm is None:
-        raise InputError(f"{run}: no alarm of this run changed its plan, so there is none to show")
+        raise InputError(f"{run}: this run has no alarm, so there is nothing to show")
     boundary = record.boundaries[alarm.position]
     found = _picture(boundary, alarm, run if run.is_dir() else run.parent)
     if found is None:
@@ -80,14 +81,15 @@ def _section(record: EpisodeRecord, boundary: BoundaryRecord, alarm: Alarm, name
     title = f"{record.task.title}: {name.replace('-', ' ')}"
     when = f"{in_words(alarm.when)} step {step}, `{alarm.subtask}`"
     score = "" if alarm.score is None else f", at a score of {alarm.score:.2f}"
-    ended = {True: "It ended well.", False: "It failed all the same.", None: "Nobody judged it."}
+    ended = {True: "The run ended well.", None: "Nobody judged how the run ended."}
+    failed = "The run went on and failed." if steps else "No plan would do: the robot stopped."
     return "\n".join(
         (
             f"## {title}\n",
             f"![{alarm.cause}]({PICTURES}/{name}.jpg)\n",
             f"*{when[0].upper()}{when[1:]}{score}:* {alarm.sentence or alarm.cause}\n",
             *(f"{n}. `{text}`" for n, text in enumerate(steps, 1)),
-            f"\n{ended[record.success]}\n",
+            f"\n{ended.get(record.success, failed)}\n",
         )
     )
 
