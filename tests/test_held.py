@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -232,6 +232,15 @@ def test_a_held_run_has_a_record_that_reads_back(tmp_path: Path) -> None:
     assert (held.status, held.reason) == (SkillStatus.REFUSED, "the robot was told to hold")
 
 
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Ctrl-C as Python has it, whoever set it before."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_who_interrupts_a_run_finds_the_robot_held(tmp_path: Path) -> None:
     def interrupt(observation: Observation) -> Observation:
         ident = threading.main_thread().ident

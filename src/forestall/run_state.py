@@ -143,9 +143,10 @@ class RunState:
     def views(self, subtask: Subtask) -> tuple[Vec3, ...]:
         """Where the hand let go last, and the arguments that it does not hold."""
         points: list[Vec3] = [] if self.worked_at is None else [self.worked_at]
+        held = self.graph.in_hands(self.domain.robot.hands)
         for name in subtask.args:
             node = self.graph.get(name)
-            if node is not None and node.centroid_m is not None and node.id != self.graph.holding:
+            if node is not None and node.centroid_m is not None and node.id not in held:
                 points.append(node.centroid_m)
         return tuple(points)
 

@@ -1,6 +1,7 @@
 """The judges on a household of others: a peg and a hole in a stranger's words."""
 
 import json
+import lzma
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -168,11 +169,15 @@ def test_the_command_prints_and_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(registry, "FOREIGN", {"pegs": f"{__name__}:Pegs"})
-    out = tmp_path / "found.json"
+    out = tmp_path / "found"
     assert call(["bench", "third-party", "pegs", "--quiet", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "pegs: 12 good programs, 2 failing runs" in printed and "dirty hole" in printed
-    data: dict[str, Any] = json.loads(out.read_text())
+    data: dict[str, Any] = json.loads(lzma.decompress((out / "results.json.xz").read_bytes()))
+    tables = {p.stem: p.read_text().splitlines() for p in out.glob("*.csv")}
+    assert set(tables) == {"judges", "changes", "needs"}
+    assert len(tables["judges"]) == 1 + len(data["rows"])
+    assert tables["judges"][1].startswith("none,its task,score,"), tables["judges"][1]
     assert len(data["runs"]) == 28 and data["rows"][0]["false_alarms"]["n"] == 12
     assert call(["bench", "third-party", "pegs", "--quiet", "--out", str(out)]) == 2
     with pytest.raises(UnknownNameError, match="unknown household 'nobody'"):

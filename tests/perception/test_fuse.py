@@ -161,7 +161,7 @@ def test_what_was_taken_out_of_a_container_is_no_longer_in_it() -> None:
     opened = {"Microwave-1": {"open": "open"}}
     robot.sees([*microwave(), *BOWL], LOW_EYE, states=opened)
     graph = robot.sees(microwave(), LOW_EYE, holding="Bowl-1", states=opened)
-    assert graph.holding == "Bowl-1"
+    assert graph.in_hands(("gripper",)) == ("Bowl-1",)
     assert truth(graph, "inside(Bowl-1, Microwave-1)") is Truth.FALSE
     assert truth(graph, "vacant(Microwave-1)") is Truth.TRUE
 
@@ -193,7 +193,7 @@ def test_what_was_dropped_out_of_view_is_nowhere() -> None:
 
 def test_a_held_thing_that_was_never_seen_is_in_the_graph() -> None:
     graph = Robot().sees([COUNTER], holding="Mug-1")
-    assert graph.holding == "Mug-1"
+    assert graph.in_hands(("gripper",)) == ("Mug-1",)
     node = graph.get("Mug-1")
     assert node is not None and node.category == "Mug"
 

@@ -70,7 +70,7 @@ def test_one_of_two_is_taken_and_the_other_keeps_its_name() -> None:
     held = goes.moved((0.39, -1.2, 0.17))
     seen = observed([COUNTER, stays, held], EYE, holding=taken, hand=HAND, time_s=1.0)
     graph = perceiver.perceive(bare(seen))
-    assert graph.holding == taken
+    assert graph.in_hands(("gripper",)) == (taken,)
     left = next(n for n in first if n != taken)
     assert np.allclose(_where(graph, "Mug")[left], first[left], atol=0.03)
     assert len(graph.of_category("Mug")) == 2
@@ -88,7 +88,7 @@ def test_what_is_held_turns_with_the_robot_and_is_one_thing() -> None:
     one = observed([COUNTER, in_front], EYE, holding="Mug", hand=(0.5, -0.7, 1.15), time_s=1.0)
     two = observed([COUNTER, aside], turned)
     graph = perceiver.perceive(bare(replace(one, frames=(*one.frames, *two.frames))))
-    assert graph.holding == name
+    assert graph.in_hands(("gripper",)) == (name,)
     assert [n.id for n in graph.of_category("Mug")] == [name]
 
 
@@ -98,9 +98,9 @@ def test_a_hand_that_knows_only_the_kind_holds_what_perception_thinks_it_holds()
     first = _where(perceiver.perceive(bare(observed([COUNTER, near, far], EYE))), "Mug")
     nearest = max(first, key=lambda n: first[n][0])
     felt = observed([COUNTER, far], EYE, holding="Mug", hand=HAND, time_s=1.0)
-    assert perceiver.perceive(bare(felt)).holding == nearest
+    assert perceiver.perceive(bare(felt)).in_hands(("gripper",)) == (nearest,)
     unseen = observed([COUNTER, far], EYE, holding="Pot", hand=HAND, time_s=2.0)
-    assert perceiver.perceive(bare(unseen)).holding == "Pot-1"
+    assert perceiver.perceive(bare(unseen)).in_hands(("gripper",)) == ("Pot-1",)
 
 
 def test_furniture_seen_in_parts_is_one_piece_and_burners_side_by_side_are_two() -> None:

@@ -200,7 +200,7 @@ def test_nothing_blocks_what_stands_before_it() -> None:
 def test_held_mug_is_held_and_rests_on_nothing() -> None:
     mug = at("Mug-1", 0.0, -0.3, 1.2, MUG, True)
     graph = graph_of([COUNTER, mug], holding="Mug-1", hand=(0.0, -0.3, 1.25))
-    assert graph.holding == "Mug-1"
+    assert graph.in_hands(("gripper",)) == ("Mug-1",)
     assert graph.parents("Mug-1", shipped("household").containing) == ()
 
 

@@ -51,6 +51,17 @@ def test_a_check_that_alarms_in_too_many_good_runs_may_not_alarm() -> None:
     assert loud[f"{SCORE} and {CHECK}"]["in_time"].value == 1.0
 
 
+def test_an_alarm_that_was_right_does_not_count_against_the_bound() -> None:
+    """A step that is refused, in a run that goes well without it."""
+    refused = calm([(1.0, 0.0)] * 5 + [(1.0, 1.0)] * 34)
+    known = [
+        replace(row, judged=tuple(replace(j, possible=j.scores[CHECK] != 0.0) for j in row.judged))
+        for row in refused
+    ]
+    found = bounded(ROWS, known, 0.05)["judges"][CHECK]
+    assert (found["thresholds"], found["in_time"].value) == ([1.0], 1.0)
+
+
 def test_together_they_keep_to_the_bound_in_new_rooms() -> None:
     random = np.random.default_rng(5)
 

@@ -123,6 +123,15 @@ def test_false_alarms_are_counted_by_run_and_by_boundary_apart() -> None:
     assert found["balanced_accuracy_all"].value == pytest.approx((1 + 1 / 3) / 2)
 
 
+def test_an_alarm_is_unfounded_where_the_truth_says_go_on() -> None:
+    """A step is refused, and the goal is reached without it."""
+    right = tuple(replace(j, possible=j.index != 1) for j in seen(0.95, 0.5, 0.95, 0.95))
+    rows = [good(0, judged=right), good(1, judged=seen(0.95, 0.5, 0.95, 0.95)), good(2)]
+    found = point_metrics(at_thresholds(Watches.of(rows), "scene-graph", (0.9,)))
+    counted = {m: (found[f"{m}_per_run_all"].count) for m in ("false_alarms", "unfounded")}
+    assert counted == {"false_alarms": 2, "unfounded": 1}
+
+
 def test_a_failing_run_is_told_apart_from_its_twin_by_an_alarm_that_the_twin_has_not() -> None:
     calm, alarmed = seen(0.95, 0.95, 0.95, 0.95), seen(0.95, 0.5, 0.95, 0.95)
     rows = [

@@ -3,11 +3,16 @@
 import pytest
 from scripted import BEFORE, HOT, OPEN, PLAN, REFERENCES, Parts, boundary
 
+from forestall.domain.load import shipped
+from forestall.domain.model import LOCATED
 from forestall.errors import InputError
 from forestall.strategies.judges import DetectorJudge, PlanJudge, WholeSceneJudge
 from forestall.strategies.watch import Watch
+from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, SceneGraph
-from forestall.types.verdict import Decision, Reference
+from forestall.types.plan import Plan
+from forestall.types.task import Goal
+from forestall.types.verdict import Decision, PlanCheck, Reference
 
 
 def named(name: str, decision: Decision) -> Parts:
@@ -97,3 +102,26 @@ def test_the_plan_check_says_what_lacks_after_another_look() -> None:
     assert (verdict.decision, verdict.score, verdict.lacking) == (Decision.REPLAN, 0.0, (HOT,))
     fine = PlanJudge(Parts(Decision.PROCEED), "plan check").judge(boundary())
     assert (fine.decision, fine.score, fine.lacking) == (Decision.PROCEED, 1.0, ())
+
+
+def test_what_has_not_been_seen_weighs_less_than_what_is_seen() -> None:
+    located, dirty = Literal(LOCATED, ("Egg",)), Literal("dirty", ("Pan-1",), "clean")
+
+    def score(*lacking: Literal, ok: bool = False) -> float | None:
+        check = PlanCheck(ok, None, "", lacking)
+        judge = PlanJudge(Says(check), "plan check")
+        return judge.judge(boundary(looks=2, may_look=False)).score
+
+    assert 0 < (unseen := score(located) or 0.0) < 0.5
+    assert score(located, Literal(LOCATED, ("Pan",))) == unseen
+    assert (score(located, dirty), score(dirty), score(), score(ok=True)) == (0.0, 0.0, 0.0, 1.0)
+
+
+class Says:
+    """A validator with one answer."""
+
+    def __init__(self, check: PlanCheck) -> None:
+        self._check, self.domain = check, shipped("household")
+
+    def check(self, plan: Plan, graph: SceneGraph, goal: Goal) -> PlanCheck:
+        return self._check

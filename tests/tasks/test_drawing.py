@@ -152,9 +152,9 @@ def test_only_what_is_held_is_lost(task: str) -> None:
             env = wrap(opened.environment, scenario.faults, opened.disturbance, loaded.domain)
             env.reset(1)
             for done in loaded.task.plan.subtasks[: candidate.since]:
-                before = opened.oracle.truth().holding
+                before = opened.oracle.truth().in_hands(("gripper",))
                 env.execute(done)
-        assert done == step and before is not None
+        assert done == step and before
 
 
 def test_a_thing_of_the_task_that_is_put_elsewhere_is_missed_where_it_was() -> None:

@@ -233,11 +233,11 @@ def test_drop_runs_the_skill_and_then_loses_the_object_once() -> None:
     inner, env, outcomes = _run({"kind": "drop", "step": "navigate_to_obj(Sink)"}, steps=steps)
     assert outcomes[-1].status is SkillStatus.SUCCEEDED
     assert outcomes[-1].duration_s > 0
-    assert inner.oracle.truth().holding is None
+    assert not inner.oracle.truth().in_hands(("gripper",))
     assert inner.oracle.truth().parents("Mug-1", DOMAIN.containing) == ("Floor-1",)
     for step in steps:
         env.execute(Subtask.parse(step))
-    assert inner.oracle.truth().holding == "Mug-1"
+    assert inner.oracle.truth().in_hands(("gripper",)) == ("Mug-1",)
 
 
 def test_drop_waits_for_a_full_hand() -> None:
@@ -245,7 +245,7 @@ def test_drop_waits_for_a_full_hand() -> None:
         {"kind": "drop", "step": "navigate_to_obj(Sink)"},
         steps=["navigate_to_obj(Sink)", "pick_up(Mug)", "navigate_to_obj(SinkBasin)"],
     )
-    assert inner.oracle.truth().holding is None
+    assert not inner.oracle.truth().in_hands(("gripper",))
 
 
 def test_failed_action_does_nothing_and_reports_success_once() -> None:
@@ -272,7 +272,7 @@ def test_wrong_object_and_wrong_receptacle() -> None:
     inner, _, _ = _run(
         {"kind": "wrong_object", "step": "pick_up(Mug)", "acts_on": "Pot"}, steps=["pick_up(Mug-1)"]
     )
-    assert inner.oracle.truth().holding == "Pot-1"
+    assert inner.oracle.truth().in_hands(("gripper",)) == ("Pot-1",)
     inner, _, _ = _run(
         {"kind": "wrong_receptacle", "step": "put_in(Mug, Sink)", "acts_on": "GarbageCan"},
         steps=["pick_up(Mug)", "put_in(Mug, Sink)"],

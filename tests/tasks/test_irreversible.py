@@ -96,8 +96,7 @@ def wash_up(run: Run) -> None:
     for node in home.nodes:
         used = node.state("dirty") == "dirty" or node.state("filled") not in (None, "empty")
         if used and run.loaded.domain.is_a(node.id, "pickupable"):
-            held = run.kitchen.oracle.truth().holding
-            if held is not None:
+            for held in run.kitchen.oracle.truth().in_hands(("gripper",)):
                 run.execute(f"put_on({held}, CounterTop)")
             run.execute(
                 f"pick_up({node.id})",

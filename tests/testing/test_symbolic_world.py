@@ -125,7 +125,7 @@ def test_the_scope_of_a_subtask_keeps_what_concerns_it() -> None:
     scoped = perceiver.scope(graph, step)
     assert {n.id for n in scoped.nodes} == {"Bolt-1", "Person-1", "Tray-1", "gripper"}
     assert scoped.subtask == step
-    assert scoped.holding == "Bolt-1"
+    assert scoped.in_hands(("gripper",)) == ("Bolt-1",)
 
 
 def test_seeds_vary_where_things_are_and_what_lies_about() -> None:

@@ -137,7 +137,7 @@ def test_what_is_where_goes_by_the_relations_that_a_domain_names() -> None:
     assert graph.parents("Bowl-1", ("inside", "on_top_of")) == ("Microwave-1",)
     assert graph.contents("Microwave-1", ("threaded_on",)) == ()
     assert graph.parents("Bowl-1", ("threaded_on",)) == ()
-    assert graph.holding == "Plate-1"
+    assert graph.in_hands(("gripper",)) == ("Plate-1",)
 
 
 def test_ids_are_unique_and_boxes_ordered() -> None:

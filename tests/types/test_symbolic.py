@@ -35,7 +35,7 @@ def test_the_short_form() -> None:
         Relation("K7", "held_by", "gripper"),
         Relation("cup-1", "stands_on", "shelf-1"),
     )
-    assert graph.holding == "K7" and graph.hidden == ("shelf-1",)
+    assert graph.in_hands(("gripper",)) == ("K7",) and graph.hidden == ("shelf-1",)
     assert scene_graph(graph) is graph
     assert scene_graph(graph.to_json()) == graph
 

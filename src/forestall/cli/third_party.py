@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import lzma
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
 if TYPE_CHECKING:
-    from forestall.experiments.third_party_rows import Judged
+    from forestall.experiments.third_party_needs import NeedsRow
+    from forestall.experiments.third_party_rows import Judged, Row
+    from forestall.statistics.cells import Table
     from forestall.statistics.intervals import Metric
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
@@ -41,7 +45,8 @@ def third_party(
         packages: folder in which its packages were installed; where Python finds them by default.
         development: judge the tasks on which things may be set, and not those that are reported.
         pooled: judge also with the demonstrations of all tasks, which takes ten times as long.
-        out: a new JSON file for the results, what was said of every run included.
+        out: a new folder for the results: tables (CSV), and in results.json.xz what was said of
+            every run.
         as_json: print JSON instead of the tables.
         quiet: no progress on standard error.
     """
@@ -50,12 +55,12 @@ def third_party(
     from forestall.cli.progress import bar
     from forestall.errors import InputError
     from forestall.experiments.third_party import judge
-    from forestall.experiments.third_party_needs import ENOUGH, compare, table
-    from forestall.experiments.third_party_rows import JUDGES, changes, rows
+    from forestall.experiments.third_party_needs import compare, table
+    from forestall.experiments.third_party_rows import rows
     from forestall.files import replace_file
 
     if out is not None and out.exists():
-        raise InputError(f"{out} is there already: name a new file")
+        raise InputError(f"{out} is there already: name a new folder")
     chosen = foreign(household)(packages=packages, development=development)
     with bar("judging", quiet=quiet or as_json) as feed:
         judged = judge(chosen, feed, pooled=pooled)
@@ -70,15 +75,31 @@ def third_party(
         "rows": [r.to_json() for r in found],
         "needs": [r.to_json() for r in needs],
     }
+    shown = (_judges(found), _changes(judged), _needs(needs))
     if out is not None:
-        replace_file(out, json.dumps({**data, "runs": [told(j) for j in judged]}).encode())
+        whole = json.dumps({**data, "runs": [told(j) for j in judged]}).encode()
+        out.mkdir(parents=True)
+        for made in shown:
+            replace_file(out / f"{made.name}.csv", made.csv().encode())
+        replace_file(out / "results.json.xz", lzma.compress(whole))
     if as_json:
         print(json.dumps(data, indent=2))
         return 0
     print(f"{household}: {good} good programs, {len(first) - good} failing runs")
-    print_table(
+    for made in shown:
+        print(made.title)
+        print_table(made.header, list(made.rows))
+    return 0
+
+
+def _judges(found: Sequence[Row]) -> Table:
+    from forestall.statistics.cells import Table
+
+    return Table(
+        "judges",
+        "what judges say of them",
         ("domain", "memory", "judge", "good runs alarmed", "detected in time", "at the step"),
-        [
+        tuple(
             (
                 r.knowledge.domain,
                 r.knowledge.memory,
@@ -86,19 +107,38 @@ def third_party(
                 *map(share, (r.false_alarms, r.detected, r.at)),
             )
             for r in found
-        ],
+        ),
     )
-    for knowledge in dict.fromkeys(j.knowledge for j in judged):
-        print(f"detected by change, domain {knowledge.domain}, memory {knowledge.memory}")
-        print_table(
-            ("change", "runs", *JUDGES),
-            [(change, str(n), *map(str, by)) for change, n, by in changes(judged, knowledge)],
-        )
-    print_table(
-        ("true by", f"from {ENOUGH} demonstrations", "precision", "recall", "skills"),
-        [(r.domain, r.what, share(r.precision), share(r.recall), str(r.skills)) for r in needs],
+
+
+def _changes(judged: Sequence[Judged]) -> Table:
+    from forestall.experiments.third_party_rows import JUDGES, changes
+    from forestall.statistics.cells import Table
+
+    return Table(
+        "changes",
+        "detected in time, by what was changed",
+        ("domain", "memory", "change", "runs", *JUDGES),
+        tuple(
+            (known.domain, known.memory, change, str(n), *map(str, by))
+            for known in dict.fromkeys(j.knowledge for j in judged)
+            for change, n, by in changes(judged, known)
+        ),
     )
-    return 0
+
+
+def _needs(needs: Sequence[NeedsRow]) -> Table:
+    from forestall.experiments.third_party_needs import ENOUGH
+    from forestall.statistics.cells import Table
+
+    return Table(
+        "needs",
+        f"mined from {ENOUGH} demonstrations, against the true ones",
+        ("true by", "what", "precision", "recall", "skills"),
+        tuple(
+            (r.domain, r.what, share(r.precision), share(r.recall), str(r.skills)) for r in needs
+        ),
+    )
 
 
 def told(judged: Judged) -> dict[str, object]:

@@ -14,7 +14,7 @@ from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
 from forestall.domain.truth import truth
-from forestall.types.facts import GRIPPER, Literal, Truth, category_of
+from forestall.types.facts import Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
@@ -34,7 +34,8 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
       somewhere not whether that is open or on: it makes no difference to driving);
     - vacant(?x) for receptacles with a capacity and for vessels;
     - accessible(?x) for what can be picked up; unblocked(?x) for what the skill needs clear;
-    - held_by(?x, gripper), hand_empty(), and held_by(Lettuce, gripper) for what is no argument;
+    - held_by(?x, gripper) for each hand, hand_empty(), and held_by(Lettuce, gripper) for what is no
+      argument;
     - the relations between two arguments that skills are about: inside(?object, ?target) or not;
     - every other derived fact about one argument, or about none, that the domain wants mined;
     - contents by category, but not of supports, on which many things merely stand.
@@ -71,12 +72,16 @@ def candidates(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset
         if not domain.is_open_support(category.name) and domain.offers(category.name):
             found |= _contents(graph, node.id, variable, roles, domain)
     found |= _between(roles, graph, domain) | _derived(tuple(roles), domain)
-    held = graph.holding
-    if held is not None and known.holding and held not in roles.values():
-        node = graph.get(held)
-        category_name = category_of(held) if node is None else node.category
-        found.add(Literal(known.holding, (category_name, GRIPPER)))
+    for hand in domain.robot.hands if known.holding else ():
+        for held in graph.in_hands((hand,)):
+            if held not in roles.values():
+                found.add(Literal(str(known.holding), (_category(held, graph), hand)))
     return frozenset(found)
+
+
+def _category(name: str, graph: SceneGraph) -> str:
+    node = graph.get(name)
+    return category_of(name) if node is None else node.category
 
 
 def _between(roles: Mapping[str, str], graph: SceneGraph, domain: Domain) -> set[Literal]:
@@ -115,9 +120,8 @@ def _about_movable(variable: str, domain: Domain) -> set[Literal]:
     roles, found = domain.roles, set()
     if roles.accessible:
         found.add(Literal(roles.accessible, (variable,)))
-    if roles.holding:
-        for value in ("true", "false"):
-            found.add(Literal(roles.holding, (variable, GRIPPER), value))
+    for hand in domain.robot.hands if roles.holding else ():
+        found |= {Literal(str(roles.holding), (variable, hand), v) for v in ("true", "false")}
     return found
 
 
@@ -140,7 +144,7 @@ def kind_of(literal: Literal, domain: Domain, skill: Skill | None = None) -> Kin
     attribute = domain.attributes.get(literal.predicate)
     if literal.is_state and (attribute is None or attribute.material):
         return Kind.MATERIAL
-    names = [a for a in literal.args if a != GRIPPER]
+    names = [a for a in literal.args if a not in domain.robot.hands]
     if not names and skill is not None and literal.args == ():
         said = {x.predicate for n in skill.needs for x, _ in literals(n.formula)}
         return Kind.SKILL if literal.predicate in said else Kind.CONTEXT
@@ -152,8 +156,8 @@ def kind_of(literal: Literal, domain: Domain, skill: Skill | None = None) -> Kin
 def evaluate(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain) -> Truth:
     """The truth of a lifted literal in a graph, its variables bound to the subtask's arguments.
 
-    A literal about an argument that is no node of the graph is unobserved. What the gripper holds
-    is always known, and so is that it stands nowhere else.
+    A literal about an argument that is no node of the graph is unobserved. What a hand holds is
+    always known, and so is that it stands nowhere else.
     """
     ground = literal.bind(domain.bound(subtask))
     for raw, name in zip(literal.args, ground.args, strict=True):
@@ -164,15 +168,15 @@ def evaluate(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Doma
     first = literal.args[0] if literal.args else ""
     if ground.predicate in domain.containing and not first.startswith("?"):
         return _contains(ground, graph)
-    if ground.predicate in domain.containing and graph.holding == ground.args[0]:
+    held = graph.in_hands(domain.robot.hands)
+    if ground.predicate in domain.containing and ground.args[0] in held:
         return Truth.TRUE if ground.value == "false" else Truth.FALSE
     return truth(graph, ground, domain)
 
 
 def _held(ground: Literal, graph: SceneGraph) -> Truth:
-    held = graph.holding
-    node = None if held is None else graph.get(held)
-    names = () if held is None else (held, category_of(held) if node is None else node.category)
+    held = graph.in_hands(ground.args[1:])
+    names = {n for h in held for n in (h, _category(h, graph))}
     return Truth.TRUE if (ground.args[0] in names) == (ground.value == "true") else Truth.FALSE
 
 

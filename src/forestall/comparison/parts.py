@@ -11,7 +11,7 @@ from forestall.comparison.needs import Kinds, Needs, Slot, variables_of
 from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.domain.schema import Category, PredicateKind, Skill
-from forestall.types.facts import GRIPPER, Literal
+from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
 
 _ALIKE = 0.5
@@ -64,7 +64,7 @@ def applies(slot: Slot, kinds: Kinds, domain: Domain) -> bool:
     if known.offered_by and len(args) > 1 and args[1] in of:
         return domain.is_a(of[args[1]], known.offered_by)
     typed = zip(known.parameters, args, strict=False)
-    return all(a == GRIPPER or a not in of or domain.is_a(of[a], p.kind) for p, a in typed)
+    return all(a not in of or domain.is_a(of[a], p.kind) for p, a in typed)
 
 
 def spoken_of(literal: Literal, skill: Skill) -> bool:

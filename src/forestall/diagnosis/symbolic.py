@@ -275,15 +275,15 @@ def _rank(literal: Literal, domain: Domain) -> int:
 
 
 def _about_hand(literal: Literal, graph: SceneGraph, when: str, domain: Domain) -> str:
-    held = graph.holding
-    if literal.predicate == domain.roles.hand_empty:
-        if literal.value == "true":
-            return f"the gripper holds {held}; it was empty {when}"
-        return f"the gripper is empty; it held something {when}"
-    now = "is empty" if held is None else f"holds {held}"
-    if literal.value == "false":
-        return f"the gripper {now}; it did not hold {literal.args[0]} {when}"
-    return f"the gripper {now}; it held {literal.args[0]} {when}"
+    about, hands = literal.predicate == domain.roles.hand_empty, domain.robot.hands
+    held = graph.in_hands(hands if about else literal.args[1:])
+    hand = f"the {hands[0] if len(hands) == 1 else 'hand' if about else literal.args[-1]}"
+    now = f"holds {' and '.join(held)}" if held else "is empty"
+    if about:
+        was = "was empty" if literal.value == "true" else "held something"
+    else:
+        was = f"{'held' if literal.value == 'true' else 'did not hold'} {literal.args[0]}"
+    return f"{hand} {now}; it {was} {when}"
 
 
 def _listed(graph: SceneGraph, name: str, domain: Domain) -> str:
@@ -327,9 +327,9 @@ def _culprits(literal: Literal, graph: SceneGraph, domain: Domain) -> tuple[str,
         return (*_blockers(graph, first, domain), first)
     if literal.predicate == roles.accessible:
         return tuple(x for x in (_closed(graph, first, domain), first) if x)
-    if literal.predicate == roles.hand_empty and graph.holding is not None:
-        return (graph.holding,)
-    if literal.predicate == roles.holding and graph.holding is not None:
-        same = category_of(graph.holding) == category_of(first)
-        return names if same else (*names, graph.holding)
+    if literal.predicate == roles.hand_empty:
+        return graph.in_hands(domain.robot.hands) or names
+    if literal.predicate == roles.holding:
+        held = graph.in_hands(literal.args[1:])
+        return (*names, *(h for h in held if category_of(h) != category_of(first)))
     return names

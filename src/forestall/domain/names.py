@@ -51,10 +51,10 @@ def ground_subtask(
             continue
         category = domain[name].name
         nodes = graph.of_category(category)
-        held = graph.get(graph.holding) if graph.holding else None
+        held = [h for h in graph.in_hands(domain.robot.hands) if _is(graph, h, category)]
         places = parameter.name == skill.hand or _may_be_in_hand(skill, domain)
-        if held is not None and held.category == category and (places or len(nodes) == 1):
-            names.append(held.id)
+        if held and (places or len(nodes) == 1):
+            names.append(held[0])
         elif bound.get(category) in {n.id for n in nodes} and not domain.is_open_support(category):
             names.append(bound[category])
         else:
@@ -103,6 +103,11 @@ def executable(subtask: Subtask, planned: Subtask, domain: Domain) -> Subtask:
             for name, raw in zip(subtask.args, planned.args, strict=True)
         ),
     )
+
+
+def _is(graph: SceneGraph, name: str, category: str) -> bool:
+    node = graph.get(name)
+    return node is not None and node.category == category
 
 
 def _may_be_in_hand(skill: Skill, domain: Domain) -> bool:

@@ -94,6 +94,8 @@ class PerceptionConfig:
             count as observed.
         glimpse_share: views of a thing with a smaller share of its largest view's pixels, in one
             observation, say nothing about its states.
+        sliver_share: what shows less than this share of the area that it has shown before
+            contradicts nothing that is believed of its states, unless it is furniture.
         same_share: share of the smaller of two boxes that both must have for a new thing to be one
             of the same category that was there before and is not seen.
         max_lost: things of one category whose place is lost that are remembered; the last ones.
@@ -169,6 +171,7 @@ class PerceptionConfig:
     expected_pixels: float = 4.0
     interior_share: float = 0.1
     glimpse_share: float = 0.5
+    sliver_share: float = 0.25
     same_place_m: float = 0.3
     same_gap_m: float = 0.05
     same_gap_share: float = 0.035

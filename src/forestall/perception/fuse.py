@@ -19,7 +19,7 @@ from forestall.perception.forgetting import give_way, let_go, merge_renamed, rem
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
-from forestall.perception.sightings import gather, in_hand, placing, readings, unlocated
+from forestall.perception.sightings import gather, placing, take_states, unlocated
 from forestall.perception.support import Parent, circular, parents
 from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import (
@@ -108,10 +108,9 @@ class SceneMemory:
     def _take_in(self, views: Sequence[View], fate: Mapping[str, Fates], time_s: float) -> set[str]:
         """Update what is in view; returns its ids."""
         found = gather(views)
-        fixtures = {n for n, f in found.items() if self._is_fixture(f[-1].category)}
-        movable = {n: f for n, f in found.items() if n not in fixtures}
-        shown = placing(movable, self.held, riding(self.tracks, self.held), self._config.ring_m)
-        shown |= {n: found[n] for n in fixtures}
+        movables = {n: f for n, f in found.items() if not self._is_fixture(f[-1].category)}
+        shown = placing(movables, self.held, riding(self.tracks, self.held), self._config.ring_m)
+        shown |= {n: f for n, f in found.items() if n not in movables}
         for name in sorted(shown):
             track = self.tracks.get(name)
             if track is None:
@@ -122,13 +121,8 @@ class SceneMemory:
             track.pixels = found[name][-1].cloud.pixels
             track.last_seen_s = time_s
             track.sightings += len(shown[name])
-            read = readings(found[name], self._config.glimpse_share)
-            if name == self.held:
-                read = in_hand(read, track.states, self._changing)
-            track.states.update(read)
-            for sighting in sorted(found[name], key=lambda s: s.cloud.pixels):
-                track.feature = sighting.feature or track.feature
-                track.look = track.look if sighting.look is None else sighting.look
+            movable, held = name in movables, name == self.held
+            take_states(track, found[name], held, self._changing, movable, self._config)
         self._take_note(views, time_s)
         return set(shown)
 

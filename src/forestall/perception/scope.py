@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from forestall.domain.model import Domain
 from forestall.perception.config import ScopeConfig
-from forestall.types.facts import GRIPPER, category_of
+from forestall.types.facts import category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
@@ -20,15 +20,13 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
         return SceneGraph(graph.nodes, graph.relations, subtask, graph.hidden)
     arguments = {i for a in subtask.args for i in graph.matches(domain.canonical(a))}
     kept = set(arguments)
-    if graph.get(GRIPPER) is not None:
-        kept.add(GRIPPER)
-    held = graph.holding
-    if held is not None:
-        kept.add(held)
+    kept |= {h for h in domain.robot.hands if graph.get(h) is not None}
+    held = graph.in_hands(domain.robot.hands)
+    kept |= set(held)
     for name in sorted(kept):
         kept |= _holders(graph, name, domain)
     for name in sorted(kept):
-        argument = name in arguments or name == held
+        argument = name in arguments or name in held
         if argument or (config.fellows and name in _direct(graph, arguments, domain)):
             kept |= _contents(graph, name, domain)
     kept |= {

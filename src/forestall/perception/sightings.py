@@ -12,13 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forestall.perception.tracks import View
+from forestall.perception.config import PerceptionConfig
+from forestall.perception.tracks import Track, View
 from forestall.perception.unproject import Cloud, Points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """One thing in one view (`view` is its index)."""
+    """One thing in one view (`view` is its index).
+
+    `area_m2` is what its mask would cover at the distance of the thing.
+    """
 
     view: int
     category: str
@@ -26,6 +30,7 @@ class Sighting:
     states: Mapping[str, str | None]
     feature: bytes | None
     look: Points | None = None
+    area_m2: float = 0.0
 
 
 def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
@@ -37,9 +42,16 @@ def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
             view.ids, view.categories, view.clouds, view.states, view.features, looks, strict=True
         ):
             if cloud is not None:
-                sighting = Sighting(index, category, cloud, states, feature, look)
+                area_m2 = _area_m2(view, cloud)
+                sighting = Sighting(index, category, cloud, states, feature, look, area_m2)
                 found.setdefault(name, []).append(sighting)
     return found
+
+
+def _area_m2(view: View, cloud: Cloud) -> float:
+    camera, k = view.frame.camera_to_world, view.frame.intrinsics
+    depth_m = float((cloud.centroid_m - camera[:3, 3]) @ camera[:3, 2])
+    return cloud.pixels * depth_m**2 / (k.fx * k.fy)
 
 
 def unlocated(views: Sequence[View]) -> dict[str, tuple[View, int]]:
@@ -69,6 +81,52 @@ def readings(sightings: Sequence[Sighting], share: float) -> dict[str, str]:
         if sighting.cloud.pixels >= least:
             found.update((a, v) for a, v in sighting.states.items() if v is not None)
     return found
+
+
+def take_states(
+    track: Track,
+    sightings: Sequence[Sighting],
+    held: bool,
+    changing: Collection[str],
+    movable: bool,
+    config: PerceptionConfig,
+) -> None:
+    """Believe what one observation shows of a thing's states and looks.
+
+    Args:
+        track: of the thing; changed.
+        sightings: of it, at least one.
+        held: whether it is in the hand.
+        changing: attributes that may be read anew there.
+        movable: whether it is a thing of which little shows only where something hides it; a piece
+            of furniture often shows a part of itself.
+        config: thresholds.
+    """
+    read = readings(sightings, config.glimpse_share)
+    if held:
+        read = in_hand(read, track.states, changing)
+    area_m2 = max(s.area_m2 for s in sightings)
+    if movable and area_m2 < config.sliver_share * track.shown_m2:
+        read = through_a_gap(read, track)
+    track.states.update(read)
+    track.shown_m2 = max(track.shown_m2, area_m2)
+    for sighting in sorted(sightings, key=lambda s: s.cloud.pixels):
+        track.feature = sighting.feature or track.feature
+        track.look = track.look if sighting.look is None else sighting.look
+
+
+def through_a_gap(read: Mapping[str, str], track: Track) -> dict[str, str]:
+    """What is believed of what was read off a sliver of a thing: it confirms, and settles nothing.
+
+    What it contradicts is unobserved from now on, and presumed to be as it was believed to be: the
+    rim of a mug behind the edge of a sink is no judge of what is in it.
+    """
+    believed = {**track.presumed, **{a: v for a, v in track.states.items() if v is not None}}
+    for attribute, value in read.items():
+        if believed.get(attribute, value) != value:
+            track.states.pop(attribute, None)
+            track.presumed[attribute] = believed[attribute]
+    return {a: v for a, v in read.items() if believed.get(a, v) == v}
 
 
 def in_hand(

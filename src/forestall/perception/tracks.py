@@ -27,8 +27,8 @@ class Track:
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
     view that showed it showed it where it was before, `vague` that it was seen and never located,
     `presumed` what skills should have made of states since they were read. `sightings` counts the
-    views that showed it, `doubted` is another category that a single view of the newest observation
-    called it.
+    views that showed it, `shown_m2` is the largest area that one of them showed, `doubted` is
+    another category that a single view of the newest observation called it.
     """
 
     id: str
@@ -51,6 +51,7 @@ class Track:
     unmoved: bool = False
     vague: bool = False
     doubted: str | None = None
+    shown_m2: float = 0.0
 
     def move(self, offset_m: Points) -> None:
         """Shift everything that is remembered of its place."""

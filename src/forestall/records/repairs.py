@@ -72,13 +72,14 @@ def changed_steps(
 def _folded(steps: Sequence[Subtask], context: BoundaryContext, domain: Domain) -> list[Subtask]:
     """Without taking what the next step puts somewhere, or what was in the hand before."""
     found: list[Subtask] = []
+    held = context.graph.in_hands(domain.robot.hands)
     for k, step in enumerate(steps):
         taken = _taken(step, domain)
         following = steps[k + 1] if k + 1 < len(steps) else None
         if taken is not None and following is not None and _in_hand(following, domain) == taken:
             continue
         last = following is None and found
-        if taken is not None and last and _same(taken, context.graph.holding):
+        if taken is not None and last and any(_same(taken, h) for h in held):
             continue
         found.append(step)
     return found

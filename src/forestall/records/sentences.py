@@ -228,11 +228,13 @@ def now(
             return f"I could not see whether {spoken.fact(fact)}"
         return spoken.fact(Literal(fact.predicate, (name,), value))
     if fact.predicate == roles.holding and wanted:
-        if graph.holding is None:
+        held = graph.in_hands(fact.args[1:])
+        if not held:
             return spoken.fact(fact, False)
-        return f"I am holding {spoken.the(graph.holding)} and not {spoken.the(name)}"
-    if fact.predicate == roles.hand_empty and graph.holding is not None and wanted:
-        return f"I am holding {spoken.the(graph.holding)}"
+        return f"I am holding {spoken.the(held[0])} and not {spoken.the(name)}"
+    held = graph.in_hands(domain.robot.hands)
+    if fact.predicate == roles.hand_empty and held and wanted:
+        return f"I am holding {' and '.join(map(spoken.the, held))}"
     if fact.predicate == roles.vacant and wanted:
         return _contents(context, name, domain, spoken, beside)
     if fact.predicate == roles.unblocked and wanted and roles.blocking is not None:

@@ -209,6 +209,6 @@ def _chips(graph: SceneGraph, node: ObjectNode, changed: frozenset[str]) -> tupl
         known.append(Chip(text, "unknown", f"not observed: {', '.join(unknown)}"))
     if node.id in graph.hidden:
         known.append(Chip("inside ?", "unknown", "no view reaches the inside"))
-    if node.id == GRIPPER and graph.holding is None:
+    if node.id == GRIPPER and not graph.in_hands((GRIPPER,)):
         known.append(Chip("empty", "", "holds nothing"))
     return tuple(known)

@@ -1,8 +1,10 @@
 """Judges under one bound on false alarms, drawn from good runs of other rooms.
 
 Called by `profile`; calls the calibration and metrics. Each threshold is the largest at which at
-most a share `LEVEL` of new good runs raises an alarm, whatever the distribution of scores
-(`calibration.conformal`, `calibration.joint`). The runs that it is drawn from are the undisturbed
+most a share `LEVEL` of new good runs raises an unfounded alarm, whatever the distribution of
+scores (`calibration.conformal`, `calibration.joint`). Unfounded is an alarm where the truth has
+nothing against going on: a run that goes well although a step of it is refused would else make a
+false alarm of the truth itself. The runs that it is drawn from are the undisturbed
 ones of a split of their own; nothing of the runs that are counted is looked at.
 """
 
@@ -24,7 +26,7 @@ from forestall.statistics.rows import EpisodeRow
 from forestall.statistics.watches import ALL, Watches
 
 LEVEL = 0.05
-"""Share of good runs in which an alarm may be raised."""
+"""Share of good runs in which an unfounded alarm may be raised."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ def bounded(
     Args:
         rows: of one profile, to be counted.
         calibration: of the same profile and other rooms.
-        level: the bound on false alarms per run.
+        level: the bound on unfounded alarms per run.
 
     Returns:
         `runs` that it was calibrated by, `level`, `smallest_level` that so many can show, and
@@ -84,8 +86,9 @@ def bounded(
     runs = np.flatnonzero(good.undisturbed)
     found = {}
     for group in groups(set(counted.names) & set(good.names)):
-        own = [line[np.isin(good.run, runs)] for line in _lines(good, group)]
-        of_run = good.run[np.isin(good.run, runs)]
+        counts = np.isin(good.run, runs) & good.faultless
+        own = [line[counts] for line in _lines(good, group)]
+        of_run = good.run[counts]
         extremes = np.array([[_extreme(line[of_run == r]) for line in own] for r in runs])
         drawn: Sequence[float | None] = [None] * len(group.columns)
         if len(runs):

@@ -34,6 +34,7 @@ JUDGED: Columns = (
     ("AUROC in time", "auroc_in_time_all", area),
     ("false alarms per faultless boundary", "false_alarms_per_boundary_all", share),
     ("false alarms per run", "false_alarms_per_run_all", share),
+    ("unfounded ones per run", "unfounded_per_run_all", share),
     ("false alarms per hour", "false_alarms_per_hour_all", mean),
     ("cause named right", "cause_right", share),
 )
@@ -48,7 +49,8 @@ ACTED: Columns = (
 
 FALSE_NOTE = (
     "At a boundary an alarm is false where the truth has nothing against going on; in a run and in "
-    "an hour of robot time, in runs that do not fail."
+    "an hour of robot time, in runs that do not fail. Unfounded: in such a run, and the truth has "
+    "nothing against going on."
 )
 
 
@@ -232,8 +234,9 @@ def _bounded(content: Content, names: Names) -> list[Table]:
         return []
     columns: Columns = (
         ("detected in time", "in_time", share),
-        ("false alarms per undisturbed run", "false_alarms_per_run_undisturbed", share),
-        ("false alarms per harmless run", "false_alarms_per_run_harmless", share),
+        ("unfounded alarms per undisturbed run", "unfounded_per_run_undisturbed", share),
+        ("unfounded alarms per harmless run", "unfounded_per_run_harmless", share),
+        ("any per undisturbed run", "false_alarms_per_run_undisturbed", share),
         ("cause named right", "cause_right", share),
     )
     rows = [
@@ -243,11 +246,13 @@ def _bounded(content: Content, names: Names) -> list[Table]:
     bound = f"{100 * found['level']:.0f} %"
     table = Table(
         "bounded",
-        f"At a bound of {bound} on false alarms per run",
+        f"At a bound of {bound} on runs with an unfounded alarm",
         ("judge", "alarm below", *heads(columns)),
         tuple(rows),
         f"Thresholds are drawn from {found['runs']} undisturbed runs of other rooms, so that the "
-        f"expected share of new ones with an alarm is at most {bound}; so many runs can show "
+        f"expected share of new ones with an unfounded alarm is at most {bound} (where the truth "
+        "has something against going on an alarm is right, though the run then goes well); so many "
+        "runs can show "
         f"{100 * found['smallest_level']:.1f} % at best. `or`: together under one bound; `and`: "
         "all must alarm at one boundary. A dash: no alarm is possible within the bound.",
     )

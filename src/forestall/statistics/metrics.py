@@ -179,18 +179,21 @@ def false_alarm_ratios(alarms: Alarms) -> dict[str, Ratio]:
     """False alarms by boundary, run and hour; the runs that they are counted on end the name.
 
     At a boundary an alarm is false where the truth has nothing against going on; those of failing
-    runs count among `ALL`. In a run, and in an hour, it is one in a run that does not fail.
+    runs count among `ALL`. In a run, and in an hour, it is one in a run that does not fail. It is
+    unfounded where both are so: a step that was refused and was not needed is no failure of the
+    run, and who foresaw the refusal was right.
     """
     of = alarms.of
     false = alarms.counts(of.faultless).mean(axis=0)
     chances = of.per_run(of.faultless)
-    any_alarm, found = alarms.share(), {}
+    any_alarm, unfounded, found = alarms.share(), alarms.share(of.faultless), {}
     for name, runs in _groups(alarms).items():
         there = alarms.seen_by if name == ALL else runs
         found[f"false_alarms_per_boundary_{name}"] = Ratio(
             false * there, chances * there, whole=alarms.single
         )
         found[f"false_alarms_per_run_{name}"] = _runs(alarms, any_alarm, runs)
+        found[f"unfounded_per_run_{name}"] = _runs(alarms, unfounded, runs)
         found[f"false_alarms_per_hour_{name}"] = Ratio(
             alarms.counts().mean(axis=0) * runs, of.hours * runs, int(runs.sum()), False
         )

@@ -305,6 +305,7 @@ def _split(summary: Mapping[str, Any], key: str, names: Names) -> Iterable[Table
 
 _PER: Columns = (
     ("false alarms per run", "false_alarms_per_run_all", share),
+    ("unfounded ones per run", "unfounded_per_run_all", share),
     ("false alarms per faultless boundary", "false_alarms_per_boundary_all", share),
     ("false alarms per hour", "false_alarms_per_hour_all", mean),
 )

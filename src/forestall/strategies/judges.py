@@ -10,12 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+from forestall.domain.model import LOCATED
 from forestall.seams import Detector, PlanValidator, Retriever
 from forestall.strategies.asked import AskedDetector, AskedRetriever, AskedValidator
 from forestall.strategies.intervention import rest_of
 from forestall.types.graph import SceneGraph
 from forestall.types.runtime import BoundaryContext
-from forestall.types.verdict import Calibration, Decision, Reference, Verdict
+from forestall.types.verdict import Calibration, Decision, PlanCheck, Reference, Verdict
+
+NOT_SEEN = 0.25
+"""Score of a plan that lacks nothing but the places of things."""
 
 Wholes = Mapping[tuple[str, int], SceneGraph]
 """(demonstration, index of the step) → everything that was known before the step."""
@@ -89,7 +93,8 @@ class WholeSceneJudge:
 class PlanJudge:
     """The plan check: score 1 where what is left of the plan reaches the goal, 0 where it does not.
 
-    Where it runs only because something is assumed that was not seen, it runs.
+    Where it runs only because something is assumed that was not seen, it runs. Where it does not
+    run only because things were not seen, which may yet turn up, the score is `NOT_SEEN`.
 
     Args:
         validator: executes the plan on what is seen, in its model of the domain.
@@ -110,12 +115,19 @@ class PlanJudge:
         return Verdict(
             decision,
             self.name,
-            score=float(check.ok),
+            score=_score(check),
             threshold=0.5,
             calibration=Calibration.FIXED,
             note=check.reason,
             lacking=() if check.ok else check.lacking or check.unmet,
         )
+
+
+def _score(check: PlanCheck) -> float:
+    if check.ok:
+        return 1.0
+    lacking = check.lacking or check.unmet
+    return NOT_SEEN if lacking and all(x.predicate == LOCATED for x in lacking) else 0.0
 
 
 def _whole(whole: SceneGraph, scoped: SceneGraph) -> SceneGraph:

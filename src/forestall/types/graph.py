@@ -188,10 +188,12 @@ class SceneGraph:
         ]
         return min(found, default=(0.0, 0.0, None))[2]
 
-    @property
-    def holding(self) -> str | None:
-        """What the gripper holds: what is related to it, in whatever words of the domain."""
-        return next((r.subject for r in self.relations if r.object == GRIPPER), None)
+    def in_hands(self, hands: Collection[str]) -> tuple[str, ...]:
+        """Ids of what hands hold: what is related to them, in whatever words of the domain.
+
+        A domain names its hands: `Domain.robot.hands`.
+        """
+        return tuple(r.subject for r in self.relations if r.object in hands)
 
     def contents(self, node_id: str, containing: Collection[str]) -> tuple[str, ...]:
         """Ids of what is directly in, on or at a node, by the relations that say where things are.

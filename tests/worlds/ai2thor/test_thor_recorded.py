@@ -128,8 +128,8 @@ def test_good_runs_become_demonstrations(demonstrations: list[Demonstration]) ->
 
 def test_each_step_has_what_was_seen_before_it(demonstrations: list[Demonstration]) -> None:
     steps = demonstrations[0].steps
-    held = [s.whole.holding for s in steps]
-    assert held == [None, None, "Pot-1", "Pot-1", None, None, None]
+    held = [s.whole.in_hands(("gripper",)) for s in steps]
+    assert held == [(), (), ("Pot-1",), ("Pot-1",), (), (), ()]
     filled = [state(s.whole, "Pot-1", "filled") for s in (steps[1], steps[6])]
     assert filled == ["empty", "water"]
     toggled = [state(s.whole, "Faucet-1", "toggled") for s in steps[4:]]
@@ -138,7 +138,7 @@ def test_each_step_has_what_was_seen_before_it(demonstrations: list[Demonstratio
         (r.subject, r.predicate, r.object) for r in steps[6].whole.relations
     }
     final = demonstrations[0].final
-    assert final is not None and final.holding == "Pot-1"
+    assert final is not None and final.in_hands(("gripper",)) == ("Pot-1",)
 
 
 def test_things_are_where_the_metadata_has_them(data: Data) -> None:

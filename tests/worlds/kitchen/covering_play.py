@@ -126,7 +126,11 @@ def truth(kitchen: SmallKitchen) -> dict[Any, Any]:
         if n.id != GRIPPER
     }
     places = {(r.subject, r.predicate, r.object) for r in graph.relations}
-    return facts | {"held": graph.holding, "spoiled": kitchen.spoiled, "relations": places}
+    return facts | {
+        "held": graph.in_hands(("gripper",)),
+        "spoiled": kitchen.spoiled,
+        "relations": places,
+    }
 
 
 def belief(state: State) -> dict[Any, Any]:
@@ -137,7 +141,11 @@ def belief(state: State) -> dict[Any, Any]:
         facts[name, "parent"] = () if place is None else (place.parent,)
     places = {(f[1], f[0], f[2]) for f in state.facts if len(f) == 3}
     spoiled = {f[1] for f in state.facts if f[0] == "spoiled"}
-    return facts | {"held": state.held, "spoiled": spoiled, "relations": places}
+    return facts | {
+        "held": tuple(filter(None, [state.held])),
+        "spoiled": spoiled,
+        "relations": places,
+    }
 
 
 def load_corpus() -> list[Episode]:

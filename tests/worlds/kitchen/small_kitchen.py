@@ -108,7 +108,7 @@ class SmallKitchen:
 
     @property
     def held(self) -> str | None:
-        return self.env.oracle.truth().holding
+        return next(iter(self.env.oracle.truth().in_hands(("gripper",))), None)
 
     @property
     def spoiled(self) -> set[str]:

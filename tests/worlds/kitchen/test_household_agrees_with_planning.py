@@ -32,7 +32,7 @@ def _truth(kitchen: SmallKitchen) -> dict[object, object]:
     facts |= {
         (n.id, "parent"): truth.parents(n.id, CONTAINING) for n in truth.nodes if n.id != GRIPPER
     }
-    return facts | {"held": truth.holding, "spoiled": kitchen.spoiled}
+    return facts | {"held": truth.in_hands(("gripper",)), "spoiled": kitchen.spoiled}
 
 
 def _belief(state: State) -> dict[object, object]:
@@ -40,7 +40,10 @@ def _belief(state: State) -> dict[object, object]:
     for name in state.kinds:
         place = state.place(name)
         facts[name, "parent"] = () if place is None else (place.parent,)
-    return facts | {"held": state.held, "spoiled": {f[1] for f in state.facts if f[0] == "spoiled"}}
+    return facts | {
+        "held": tuple(filter(None, [state.held])),
+        "spoiled": {f[1] for f in state.facts if f[0] == "spoiled"},
+    }
 
 
 def _random_subtask(rng: np.random.Generator, names: list[str], held: str | None) -> Subtask:
