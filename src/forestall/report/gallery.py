@@ -6,6 +6,7 @@ alarm that changed its plan, else at its first, and nothing is said but what its
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,9 +30,10 @@ _FRAME = (226, 60, 40)
 
 _HEAD = """# Failures, in pictures
 
-Each of these runs would have failed. Every picture is what the robot saw when forestall stopped it,
+Each of these runs was going to fail. Every picture is what the robot saw when forestall stopped it,
 with a frame around what the alarm speaks about; the text is what it told its owner, and the plan,
-where there is one, is what it did instead. Everything here comes from the records of the runs, by the command at the end.
+where there is one, is what it did instead. Everything here comes from the records of the runs, by
+the command at the end.
 """
 
 
@@ -53,7 +55,9 @@ def write_gallery(folder: Path, runs: Sequence[Path]) -> Path:
     for name, _, picture in shown:
         replace_file(folder / PICTURES / f"{name}.jpg", picture)
     command = f"forestall gallery {folder.name} RUN..."
-    made = f"`{command}`, of {len(shown)} runs of `forestall run TASK --scenario NAME`."
+    made = (
+        f"Made by `{command}` of what `forestall run TASK --scenario NAME --out RUN` left behind."
+    )
     text = "\n".join((_HEAD, *(section for _, section, _ in shown), made, ""))
     replace_file(folder / PAGE_NAME, text.encode("utf-8"))
     return folder / PAGE_NAME
@@ -83,30 +87,38 @@ def _section(record: EpisodeRecord, boundary: BoundaryRecord, alarm: Alarm, name
     score = "" if alarm.score is None else f", at a score of {alarm.score:.2f}"
     ended = {True: "The run ended well.", None: "Nobody judged how the run ended."}
     failed = "The run went on and failed." if steps else "No plan would do: the robot stopped."
-    return "\n".join(
-        (
-            f"## {title}\n",
-            f"![{alarm.cause}]({PICTURES}/{name}.jpg)\n",
-            f"*{when[0].upper()}{when[1:]}{score}:* {alarm.sentence or alarm.cause}\n",
-            *(f"{n}. `{text}`" for n, text in enumerate(steps, 1)),
-            f"\n{ended.get(record.success, failed)}\n",
-        )
+    numbered = "\n".join(f"{n}. `{text}`" for n, text in enumerate(steps, 1))
+    paragraphs = (
+        f"## {title}",
+        f"![{alarm.cause}]({PICTURES}/{name}.jpg)",
+        f"*{when[0].upper()}{when[1:]}{score}:* {alarm.sentence or alarm.cause}",
+        numbered,
+        ended.get(record.success, failed),
     )
+    return "\n\n".join(p for p in paragraphs if p) + "\n"
 
 
 def _picture(boundary: BoundaryRecord, alarm: Alarm, folder: Path) -> Rgb | None:
-    """The newest picture that shows what the alarm speaks about, else the newest of all."""
+    """The picture that shows most of what the alarm speaks about, else the newest of all."""
     frames = () if boundary.observation is None else boundary.observation.frames
-    newest: Rgb | None = None
+    about = _about(boundary, alarm)
+    best: tuple[float, Rgb] | None = None
     for frame in reversed(frames):
         rgb = rgb_of(frame, folder)
         if rgb is None:
             continue
-        newest = rgb if newest is None else newest
-        about = [f for f in framed(boundary.graph, frame, alarm.culprits) if f.culprit]
-        if about:
-            return _outlined(rgb, about)
-    return newest
+        found = [f for f in framed(boundary.graph, frame, about) if f.culprit]
+        area = sum(f.width * f.height for f in found)
+        if best is None or area > best[0]:
+            best = (area, _outlined(rgb, found))
+    return None if best is None else best[1]
+
+
+def _about(boundary: BoundaryRecord, alarm: Alarm) -> set[str]:
+    """The things that an alarm names: what is to blame, else all in its cause."""
+    told = " ".join((alarm.cause, *alarm.must_change))
+    named = set(re.findall(r"[\w-]+", told))
+    return set(alarm.culprits) or {n.id for n in boundary.graph.nodes if n.id in named}
 
 
 def _outlined(rgb: Rgb, about: Sequence[Framed]) -> Rgb:
