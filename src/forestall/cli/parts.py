@@ -26,9 +26,9 @@ def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
         for name, of in TABLES.items():
             each = [of.default, *(n for n in known(name) if n != of.default)]
             print(f"{name}: {', '.join(_told(name, n, n == of.default) for n in each)}")
-        absent = sorted({e for k in TABLES for n in known(k) if (e := lacking(k, n))})
-        for extra in absent:
-            print(f"[{extra}] is not installed: {how(extra)}")
+        absent = {e for k in TABLES for n in known(k) if (e := lacking(k, n)) is not None}
+        for one in sorted(absent):
+            print(f"[{one}] is not installed: {how(one)}")
         return 0
     wanted = list(TABLES) if kind is None else [table(kind).kind.name]
     if as_json:

@@ -369,7 +369,12 @@ def _write_frame(
         arrays: dict[str, Any] = {f"m{i}": d.mask for i, d in enumerate(frame.detections)}
         np.savez_compressed(folder / masks, **arrays)
         for key, d in zip(arrays, frame.detections, strict=True):
-            own = {"category": d.category, "instance": d.instance, "score": d.score, "mask": key}
+            own: dict[str, object] = {
+                "category": d.category,
+                "instance": d.instance,
+                "score": d.score,
+                "mask": key,
+            }
             if d.states and (d.instance or not tail):  # of several frames states need an instance
                 own["states"] = dict(d.states)
             detections.append(own)

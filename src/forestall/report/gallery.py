@@ -100,10 +100,10 @@ def _section(record: EpisodeRecord, boundary: BoundaryRecord, alarm: Alarm, name
 
 def _picture(boundary: BoundaryRecord, alarm: Alarm, folder: Path) -> Rgb | None:
     """The picture that shows most of what the alarm speaks about, else the newest of all."""
-    frames = () if boundary.observation is None else boundary.observation.frames
+    seen = boundary.observation
     about = _about(boundary, alarm)
     best: tuple[float, Rgb] | None = None
-    for frame in reversed(frames):
+    for frame in reversed(seen.frames if seen is not None else ()):
         rgb = rgb_of(frame, folder)
         if rgb is None:
             continue
