@@ -18,8 +18,8 @@ from forestall.records.derived import Alarm, adopted, alarms, done_before, in_wo
 from forestall.records.pictures import encode_jpeg, rgb_of
 from forestall.records.record import read_record
 from forestall.report.in_picture import Framed, framed
-from forestall.types.episode import BoundaryRecord, EpisodeRecord
-from forestall.types.observation import Rgb
+from forestall.types.episode import BoundaryRecord, EpisodeRecord, StoredFrame
+from forestall.types.observation import Frame, Rgb
 from forestall.types.runtime import When
 
 PAGE_NAME = "gallery.md"
@@ -30,7 +30,7 @@ _FRAME = (226, 60, 40)
 
 _HEAD = """# Failures, in pictures
 
-Each of these runs was going to fail. Every picture is what the robot saw when forestall stopped it,
+Each of these runs was going to fail. Every picture is what the robot saw at the moment of the alarm,
 with a frame around what the alarm speaks about; the text is what it told its owner, and the plan,
 where there is one, is what it did instead. Everything here comes from the records of the runs, by
 the command at the end.
@@ -101,9 +101,10 @@ def _section(record: EpisodeRecord, boundary: BoundaryRecord, alarm: Alarm, name
 def _picture(boundary: BoundaryRecord, alarm: Alarm, folder: Path) -> Rgb | None:
     """The picture that shows most of what the alarm speaks about, else the newest of all."""
     seen = boundary.observation
+    frames: Sequence[Frame | StoredFrame] = () if seen is None else seen.frames
     about = _about(boundary, alarm)
     best: tuple[float, Rgb] | None = None
-    for frame in reversed(seen.frames if seen is not None else ()):
+    for frame in reversed(frames):
         rgb = rgb_of(frame, folder)
         if rgb is None:
             continue
