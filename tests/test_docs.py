@@ -17,7 +17,8 @@ PATH = re.compile(r"`([\w./-]+\.(?:py|md|toml|jsonl?|jinja))`|\]\(([\w./-]+)\)")
 MADE_BY_USERS = {
     "observation.json", "record.json", "boundaries.jsonl", "runs/episodes.jsonl", "ladle-lost.toml",
     "fetch-ladle.toml", "episodes.jsonl", "experiment.json", "effort.jsonl", "summary.json",
-    "task.json", "001.json", "OUT/failing.json", "OUT/report.json", "gallery.md",
+    "task.json", "001.json", "OUT/failing.json", "OUT/report.json", "scene.json",
+    "data/tasks/TASK.json", "gallery.md",
 }  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from forestall.types.episode import (
 )
 from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
-from forestall.types.foreign import ForeignRun
+from forestall.types.foreign import ForeignPlan, ForeignRun
 from forestall.types.graph import SceneGraph
 from forestall.types.kind import Kind
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
@@ -222,6 +222,24 @@ class DataSet(Protocol):
 
     def runs(self, domain: Domain) -> Iterator[RecordedRun | Unread]:
         """Each run, or why it cannot be used."""
+
+
+class PlanSet(Protocol):
+    """Plans that somebody else wrote and what must never be so around their steps.
+
+    Made with a file or a folder. A plan in whose domain something is left out says what.
+    """
+
+    name: str
+
+    def __len__(self) -> int:
+        """How many plans there may be."""
+
+    def plans(self) -> Iterator[ForeignPlan | Unread]:
+        """Each plan, or why it cannot be converted."""
+
+    def domain(self, plan: ForeignPlan) -> Domain:
+        """What a plan's steps need and do, and its safety rules; plans may share one."""
 
 
 class Parts(Protocol):

@@ -121,7 +121,7 @@ def test_the_command_runs_in_any_world(tmp_path: Path, capsys: pytest.CaptureFix
     config = json.loads(capsys.readouterr().out)["provenance"]["config"]
     assert config["parts"]["world"]["given"] == {"gravity": 1.6}
     assert call(["run", "heat-potato", "--world", "kitchn"]) == 2
-    assert "known: ai2thor, kitchen" in capsys.readouterr().err
+    assert "known: ai2thor, frankakitchen, kitchen" in capsys.readouterr().err
     assert call(["run", "heat-potato", *parts[:2], "--renderer", "rays"]) == 2
     assert "'renderer': known: gravity" in capsys.readouterr().err
 

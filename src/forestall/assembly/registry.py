@@ -55,6 +55,7 @@ TABLES: Mapping[str, Table] = {
             "kitchen",
             {
                 "ai2thor": "forestall.worlds.ai2thor.part:Thor",
+                "frankakitchen": "forestall.worlds.frankakitchen.part:FrankaKitchens",
                 "kitchen": "forestall.worlds.kitchen.part:Kitchens",
                 "symbolic": "forestall.testing.part:SymbolicWorlds",
             },
@@ -70,7 +71,10 @@ TABLES: Mapping[str, Table] = {
         Table(
             kinds.DOMAIN,
             "household",
-            {name: f"{_SEEING}:{name}" for name in ("ai2thor", "bench", "household")},
+            {
+                name: f"{_SEEING}:{name}"
+                for name in ("ai2thor", "bench", "frankakitchen", "household")
+            },
         ),
         Table(
             kinds.SEGMENTER,
@@ -185,6 +189,7 @@ TABLES: Mapping[str, Table] = {
 
 NEEDS: Mapping[tuple[str, str], str] = {
     (kinds.WORLD.name, "ai2thor"): "ai2thor",
+    (kinds.WORLD.name, "frankakitchen"): "kitchen",
     (kinds.WORLD.name, "kitchen"): "kitchen",
     (kinds.PERCEIVER.name, "graph"): "perception",
     **{(kinds.SENSOR.name, n): "perception" for n in ("kinect", "realistic", "realsense", "tof")},
@@ -210,6 +215,13 @@ DATA_SETS: Mapping[str, str] = {
 }
 """Recorded runs of others (`seams.DataSet`), each made with its folder: no part of a run. Others
 add theirs by entry point, group "forestall.data-set"."""
+
+PLAN_SETS: Mapping[str, str] = {
+    "isbench": "forestall.worlds.isbench.tasks:Tasks",
+    "safeagentbench": "forestall.worlds.ai2thor.safeagentbench.plans:SafeAgentBench",
+}
+"""Plans of others (`seams.PlanSet`), each made with its file or folder: no part of a run. Others
+add theirs by entry point, group "forestall.plan-set"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,6 +323,23 @@ def data_set(name: str) -> Callable[..., Any]:
         InputError: it is known and cannot be imported.
     """
     return _of_others("data set", name, DATA_SETS, "data-set")
+
+
+def plan_set(name: str) -> Callable[..., Any] | None:
+    """What opens plans of others, by the name of their set; None where no set has it.
+
+    Raises:
+        InputError: it is known and cannot be imported.
+    """
+    if name not in PLAN_SETS and name not in {e.name for e in _entries("plan-set")}:
+        return None
+    return _of_others("set of plans", name, PLAN_SETS, "plan-set")
+
+
+def imported_sets() -> tuple[str, ...]:
+    """Every name that `forestall import` takes."""
+    others = [e.name for group in ("data-set", "plan-set") for e in _entries(group)]
+    return tuple(sorted({*DATA_SETS, *PLAN_SETS, *others}))
 
 
 def _of_others(what: str, name: str, shipped: Mapping[str, str], group: str) -> Callable[..., Any]:

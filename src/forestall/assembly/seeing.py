@@ -101,6 +101,11 @@ def bench() -> Domain:
     return shipped("bench")
 
 
+def frankakitchen() -> Domain:
+    """The fixtures of FrankaKitchen."""
+    return shipped("frankakitchen")
+
+
 def oracle(parts: Parts) -> OracleStateEstimator:
     """The truth of what a camera could tell."""
     oracle: OracleView = parts.lent("truth")

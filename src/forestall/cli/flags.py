@@ -29,11 +29,12 @@ class SeeingFlags:
     """What a scene is seen with.
 
     Args:
-        world: where the robot acts: kitchen, symbolic, ai2thor, or package.module:Class.
+        world: where the robot acts: kitchen, symbolic, ai2thor, frankakitchen, or
+            package.module:Class.
         sensor: what the robot looks through: perfect, realsense, kinect, tof or realistic (stereo
             noise, pose and mask errors, no identities).
-        domain: what the task is read in: household, bench, ai2thor, or a file (.toml, .pddl); its
-            own by default.
+        domain: what the task is read in: household, bench, ai2thor, frankakitchen, or a file
+            (.toml, .pddl); its own by default.
         states: where object states come from: learned (pixels, by the shipped encoder), clip
             (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
         feature: what a node's feature encodes: text, parts (category and states) or image.

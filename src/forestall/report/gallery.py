@@ -30,10 +30,10 @@ _FRAME = (226, 60, 40)
 
 _HEAD = """# Failures, in pictures
 
-Each of these runs was going to fail. Every picture is what the robot saw at the moment of the alarm,
-with a frame around what the alarm speaks about; the text is what it told its owner, and the plan,
-where there is one, is what it did instead. Everything here comes from the records of the runs, by
-the command at the end.
+Each of these runs was going to fail. Every picture is what the robot saw at the moment of the
+alarm, with a frame around what it speaks about; the text is what the robot told its owner, and the
+plan, where there is one, is what it did instead. Everything here comes from the records of the runs,
+by the command at the end.
 """
 
 
