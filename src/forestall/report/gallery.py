@@ -32,8 +32,8 @@ _HEAD = """# Failures, in pictures
 
 Each of these runs was going to fail. Every picture is what the robot saw at the moment of the
 alarm, with a frame around what it speaks about; the text is what the robot told its owner, and the
-plan, where there is one, is what it did instead. Everything here comes from the records of the runs,
-by the command at the end.
+plan, where there is one, is what it did instead. Everything here comes from the records of these
+runs, by the command at the end.
 """
 
 
