@@ -1,6 +1,7 @@
 """Every check of the project in one command: `python check.py`.
 
-Formatting, linting, types, import contracts, tests with the share of lines that they run.
+Formatting, linting, types, import contracts, the documentation as a site (every warning is an
+error), tests with the share of lines that they run.
 `python check.py fast` leaves out that share and the tests that draw in the simulator or take long:
 the check before every commit. `python check.py tests -k memory` runs the tests alone and hands the
 rest to pytest.
@@ -20,6 +21,7 @@ STATIC = {
     "lint": ["-m", "ruff", "check", "."],
     "types": ["-m", "mypy"],
     "imports": ["-c", "from importlinter.cli import lint_imports_command as run; run()"],
+    "docs": ["-m", "mkdocs", "build", "--strict", "--quiet"],
 }
 TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadgroup"]
 FAST = ["-m", "not slow and not simulator"]

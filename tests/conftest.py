@@ -1,11 +1,14 @@
 """Shared by all tests: no test touches the user's cache; those of a world are marked; a browser."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from forestall.errors import InputError
+from forestall.extras import EXTRAS, how, installed, missed
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
@@ -30,6 +33,49 @@ def chromium() -> Iterator[Any]:
         )
         yield browser
         browser.close()
+
+
+ABSENT = tuple(extra for extra in EXTRAS if not installed(extra))
+"""Extras that are not installed: what needs one of them is skipped, and says so."""
+
+
+def _absent(error: BaseException | None) -> str | None:
+    """The sentence of an error that only says that an extra is not installed."""
+    while error is not None:
+        said = missed(error) or (str(error) if isinstance(error, InputError) else "")
+        if any(how(extra) in said for extra in ABSENT):
+            return said
+        error = error.__cause__ or error.__context__
+    return None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """A file of tests that cannot be imported without an extra is skipped where that is absent."""
+    report = yield
+    if ABSENT and report.failed and isinstance(collector, pytest.Module):
+        found = next((e for e in ABSENT for m in EXTRAS[e].modules
+                      if f"No module named '{m}" in str(report.longrepr)), None)  # fmt: skip
+        if found is not None:
+            report.outcome = "skipped"
+            report.longrepr = (str(collector.path), 0, f"Skipped: needs {how(found)}")
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A test that stops for want of an extra is skipped where that is absent."""
+    report = yield
+    if ABSENT and report.failed and call.excinfo is not None:
+        said = _absent(call.excinfo.value)
+        if said is not None:
+            report.outcome = "skipped"
+            report.longrepr = (str(item.path), 0, f"Skipped: {said}")
+    return report
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

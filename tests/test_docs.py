@@ -1,6 +1,7 @@
 """The documents: examples work, and every path and command that they name exists."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ MADE_BY_USERS = {
     "task.json", "001.json", "OUT/failing.json", "OUT/report.json", "run.json", "meta/info.json",
     "scene.json", "data/tasks/TASK.json",
     "graph.json", "perception.json", "config.json", "preprocessor_config.json",
+    "gallery.md",
 }  # fmt: skip
 
 
@@ -77,3 +79,31 @@ def test_the_page_for_ones_own_robot_runs_and_prints_what_it_says(
             (tmp_path / "one.json").write_text(text, encoding="utf-8")
             assert call(["demos", "add", "other.db", "one.json"]) == 0
     assert [k for k, _ in blocks].count("python") == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "codes"), [("from-rgbd", [0, 1]), ("your-domain", [0, 0, 0, 0, 0])]
+)
+def test_a_page_that_is_gone_through_in_order_prints_what_it_says(
+    name: str,
+    codes: list[int],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    printed, ended = "", []
+    for kind, text in re.findall(r"```(python|text|bash|toml)\n(.*?)```", page, re.S):
+        if kind == "python":
+            exec(compile(text, f"docs/{name}.md", "exec"), names)
+            printed = capsys.readouterr().out
+        elif kind == "text":
+            assert printed == text
+        elif kind == "toml":
+            (tmp_path / "hoses.toml").write_text(text, encoding="utf-8")
+        else:
+            ended += [call(shlex.split(line)[1:]) for line in text.splitlines()]
+            capsys.readouterr()
+    assert ended == codes

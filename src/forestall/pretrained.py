@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from forestall.errors import InputError, ModelFileError
+from forestall.extras import how
 
 _HUB_NAME = re.compile(r"[\w.-]+(/[\w.-]+)?")
 _NOT_NEEDED = ("*.h5", "*.msgpack", "*.ot", "*.onnx", "onnx/*", "openvino/*")
@@ -31,8 +32,7 @@ def package(name: str, extra: str) -> Any:
         return import_module(name)
     except ImportError as error:
         raise InputError(
-            f"this part needs {name}, which cannot be imported ({error}): "
-            f"pip install 'forestall[{extra}]'"
+            f"this part needs {name}, which cannot be imported ({error}): {how(extra)}"
         ) from error
 
 
@@ -195,7 +195,7 @@ def onnx_session(
     except ImportError as error:
         raise ModelFileError(
             f"the encoder needs onnxruntime, which cannot be imported ({error}): "
-            "pip install onnxruntime"
+            f"{how('perception')}"
         ) from error
     from onnxruntime.capi import onnxruntime_pybind11_state as states
 

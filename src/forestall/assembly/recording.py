@@ -181,11 +181,11 @@ def as_people_do(prepared: Prepared, variant: int) -> Prepared:
 def make_viewer(config: RunConfig, domain: Domain) -> Callable[[BoundaryRecord], View | None]:
     """What keeps the pictures of a run as views: an image feature and a caption."""
     parts = Assembly(config.choices, domain)
-    encoder, captioner = parts.part(IMAGE_ENCODER), parts.part(CAPTIONER)
 
     def view(boundary: BoundaryRecord) -> View | None:
         if not isinstance(boundary.observation, Observation) or not boundary.observation.frames:
             return None
+        encoder, captioner = parts.part(IMAGE_ENCODER), parts.part(CAPTIONER)
         return view_of(boundary.observation, boundary.scoped, encoder, captioner)
 
     return view

@@ -23,6 +23,7 @@ from typing import Any
 from forestall import kinds
 from forestall.domain.load import load_domain
 from forestall.errors import InputError, UnknownNameError
+from forestall.extras import installed, missed
 from forestall.types.kind import Kind
 
 
@@ -209,6 +210,23 @@ TABLES: Mapping[str, Table] = {
 }
 
 
+NEEDS: Mapping[tuple[str, str], str] = {
+    (kinds.WORLD.name, "ai2thor"): "ai2thor",
+    (kinds.WORLD.name, "frankakitchen"): "kitchen",
+    (kinds.WORLD.name, "kitchen"): "kitchen",
+    (kinds.PERCEIVER.name, "graph"): "perception",
+    **{(kinds.SENSOR.name, n): "perception" for n in ("kinect", "realistic", "realsense", "tof")},
+    (kinds.STATES.name, "clip"): "vision",
+    (kinds.STATES.name, "learned"): "perception",
+    (kinds.TEXT_ENCODER.name, "sentence"): "text",
+    (kinds.TEXT_ENCODER.name, "two-tower"): "perception",
+    (kinds.IMAGE_ENCODER.name, "clip"): "vision",
+    (kinds.IMAGE_ENCODER.name, "two-tower"): "perception",
+    (kinds.CAPTIONER.name, "blip"): "vision",
+    (kinds.LLM.name, "openai"): "llm",
+}
+"""Kind and name of a shipped part that works only with an extra → that extra."""
+
 FOREIGN: Mapping[str, str] = {
     "virtualhome": "forestall.worlds.virtualhome.household:Household",
 }
@@ -285,6 +303,12 @@ def known(kind: str) -> tuple[str, ...]:
     return tuple(sorted({*table(kind).targets, *(e.name for e in _entries(kind))}))
 
 
+def lacking(kind: str, name: str) -> str | None:
+    """The extra without which a part does not work, where it is not installed."""
+    extra = NEEDS.get((kind, name))
+    return None if extra is None or installed(extra) else extra
+
+
 def find(kind: str, name: str) -> Found:
     """The factory behind a name, behind "module:attribute", or behind the file of a domain.
 
@@ -296,7 +320,8 @@ def find(kind: str, name: str) -> Found:
         try:
             return Found(kind, name, _imported(target), None)
         except ImportError as error:
-            raise InputError(f"{kind} {name!r} cannot be loaded ({target}): {error}") from error
+            why = missed(error) or error
+            raise InputError(f"{kind} {name!r} cannot be loaded ({target}): {why}") from error
     target, package = name, None
     for entry in _entries(kind):
         if entry.name == name:
@@ -370,7 +395,8 @@ def _of_others(what: str, name: str, shipped: Mapping[str, str], group: str) -> 
     try:
         return _imported(target)
     except ImportError as error:
-        raise InputError(f"{what} {name!r} cannot be loaded ({target}): {error}") from error
+        why = missed(error) or error
+        raise InputError(f"{what} {name!r} cannot be loaded ({target}): {why}") from error
 
 
 def _entries(kind: str) -> tuple[EntryPoint, ...]:

@@ -17,11 +17,12 @@ from forestall.cli.demos import demos
 from forestall.cli.doctor import doctor
 from forestall.cli.domain import domain
 from forestall.cli.encoder import encoder
+from forestall.cli.examples import EXAMPLES
 from forestall.cli.flags import spelt
 from forestall.cli.importing import import_
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
-from forestall.cli.page import page
+from forestall.cli.page import gallery, page
 from forestall.cli.parts import parts
 from forestall.cli.perceive import perceive
 from forestall.cli.plan import plan
@@ -43,6 +44,7 @@ for command in (
     beside,
     view,
     page,
+    gallery,
     tasks,
     scenarios,
     parts,
@@ -66,6 +68,14 @@ app.command(encoder)
 app.command(plan)
 app.command(preconditions)
 app.command(study)
+app.register_install_completion_command(
+    help="Install completion for bash, zsh, fish or PowerShell, and have it loaded by new shells."
+)
+for name, example in EXAMPLES.items():
+    shown = app
+    for word in name.split():
+        shown = shown[word]
+    shown.help_epilogue = f"Example: `forestall {example}`"
 
 
 def answer(arguments: Sequence[str]) -> int:

@@ -78,7 +78,8 @@ def episodes(
         task: tasks to run undisturbed; all by default, none when only scenarios are named.
         scenario: scenarios to run, or names of sets (see `forestall scenarios`); "all" for every
             shipped one; none by default.
-        strategy: strategies; none and proactive by default.
+        strategy: none, retry-once, plan-check, proactive, online, online-scene, post-hoc, watch;
+            none and proactive by default.
         seeds: scenes, e.g. 100:120 for 100 to 119.
         jobs: how many processes; all cores by default.
         out: folder of the results; what is finished in it is not run again. By default one under

@@ -57,7 +57,7 @@ def calibrate(
         irreversible_share: of the budget that is spent before what cannot be undone.
         pooled: no thresholds for each task, one for all.
         later: folders of good runs since then, in order: does the calibration still fit?
-        out: the TOML file to write; the picture lies beside it (.svg).
+        out: the TOML file to write; the picture lies beside it (.svg, extra [figures]).
         parts: which parts, and their options.
         quiet: no progress bar.
     """
@@ -66,6 +66,7 @@ def calibrate(
     from forestall.calibration.fitted import LEVEL
     from forestall.calibration.scores import Parts
     from forestall.cli.progress import bar
+    from forestall.extras import how, installed
     from forestall.files import replace_file
     from forestall.memory.store import open_store
     from forestall.report.calibration_figure import calibration_figure
@@ -94,9 +95,14 @@ def calibrate(
         _say_later(table, later)
     if out is not None:
         write_calibration(out, table)
-        picture = out.with_suffix(".svg")
-        replace_file(picture, calibration_figure(_panels(table), table.level))
-        say(f"{out} and {picture} written: give it to runs with --detector.calibration {out}")
+        written = f"{out}"
+        if installed("figures"):
+            picture = out.with_suffix(".svg")
+            replace_file(picture, calibration_figure(_panels(table), table.level))
+            written = f"{out} and {picture}"
+        else:
+            say(f"no picture of it: {how('figures')}")
+        say(f"{written} written: give it to runs with --detector.calibration {out}")
     return 0
 
 

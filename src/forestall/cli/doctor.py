@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+
+from forestall.extras import EXTRAS, how, installed
 
 if TYPE_CHECKING:
     from forestall.types.world import Working
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
-
-_EXTRAS = {
-    "planning": (("unified_planning", "up_fast_downward"), "cross-check with Fast Downward"),
-    "text": (("sentence_transformers",), "a sentence encoder, --encoder sentence"),
-    "training": (("torch", "onnx"), "training an image-text encoder"),
-    "vision": (
-        ("torch", "transformers"),
-        "detectors and encoders of real pictures: --segmenter finder, --states clip",
-    ),
-}
 
 
 def doctor(*, as_json: Json = False) -> int:
@@ -67,7 +58,8 @@ def _needed() -> list[dict[str, Any]]:
             rows.append(_row("memory", True, True, f"SQLite {sqlite3.sqlite_version}"))
         except ForestallError as error:
             rows.append(_row("memory", False, True, str(error), "free space or use another folder"))
-    rows.append(_encoder())
+    if installed("perception"):
+        rows.append(_encoder())
     folder_ok, detail = _writable(cache_dir())
     rows.append(
         _row("cache folder", folder_ok, True, detail, "set FORESTALL_CACHE to a writable folder")
@@ -77,7 +69,9 @@ def _needed() -> list[dict[str, Any]]:
 
 
 def _world() -> Sequence[Working]:
-    """What the world of the shipped tasks says of this machine."""
+    """What the world of the shipped tasks says of this machine, where it is installed."""
+    if not installed("kitchen"):
+        return ()
     from forestall.assembly.configuration import run_config
     from forestall.assembly.make import make_world
     from forestall.tasks.files import load_task, task_names
@@ -120,15 +114,8 @@ def _writable(folder: Any) -> tuple[bool, str]:
 
 def _optional() -> list[dict[str, Any]]:
     rows = []
-    for extra, (modules, what) in _EXTRAS.items():
-        works = all(find_spec(m) is not None for m in modules)
-        rows.append(
-            _row(
-                f"extra [{extra}]",
-                works,
-                False,
-                what if works else f"not installed ({what})",
-                f"pip install 'forestall[{extra}]'",
-            )
-        )
+    for extra, brings in EXTRAS.items():
+        works = installed(extra)
+        detail = brings.what if works else f"not installed ({brings.what})"
+        rows.append(_row(f"extra [{extra}]", works, False, detail, how(extra)))
     return rows

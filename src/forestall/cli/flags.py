@@ -29,10 +29,12 @@ class SeeingFlags:
     """What a scene is seen with.
 
     Args:
-        world: where the robot acts: a name, or package.module:Class.
+        world: where the robot acts: kitchen, symbolic, ai2thor, frankakitchen, or
+            package.module:Class.
         sensor: what the robot looks through: perfect, realsense, kinect, tof or realistic (stereo
             noise, pose and mask errors, no identities).
-        domain: what the task is read in: a name, or a file (.toml, .pddl); its own by default.
+        domain: what the task is read in: household, bench, ai2thor, frankakitchen, or a file
+            (.toml, .pddl); its own by default.
         segmenter: where masks come from: instance-ids (the simulator's), given-masks (a stored
             observation's own), finder (a detector's boxes, outlined).
         finder: of boxes, for the segmenter finder: grounding-dino, owlv2, onnx.
@@ -106,9 +108,9 @@ class RunFlags(ComparingFlags):
     """Who judges and steps in, besides.
 
     Args:
-        strategy: when a run may be interrupted: none, proactive, online, online-scene, post-hoc;
-            watch lets every detector judge and never interrupts.
-        detector: of a strategy that steps in: scene-graph, objects, caption or image.
+        strategy: when a run may be interrupted: none, retry-once, plan-check, proactive, online,
+            online-scene, post-hoc; watch lets every detector judge and never interrupts.
+        detector: of a strategy that steps in: scene-graph, preconditions, objects, caption, image.
         threshold: alarm when no demonstration reaches this score.
         llm: the language model that explains and plans: an endpoint's address, a model's name,
             replay:FILE (the answers of an earlier run), record:FILE (write them down).

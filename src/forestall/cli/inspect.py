@@ -82,6 +82,7 @@ def check(
     explain: Path | None = None,
     memory: Path | None = None,
     domain: str | None = None,
+    detector: str | None = None,
     threshold: float | None = None,
     states: str | None = None,
     config: Path | None = None,
@@ -107,6 +108,7 @@ def check(
         memory: a demonstration file; the ready-made one of the task by default.
         domain: what everything is read in: a name, or a file (.toml, .pddl); by default the task's,
             else one that has the skills of the memory, else one that is learnt from it.
+        detector: what judges: scene-graph (by default), preconditions, objects, caption, image.
         threshold: alarm when no demonstration reaches this score.
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
@@ -124,6 +126,7 @@ def check(
     from forestall.report.page import write_page
 
     given = RunFlags(
+        detector=detector,
         threshold=threshold,
         states=states,
         memory=memory,

@@ -1,17 +1,22 @@
-"""`forestall tasks` and `forestall scenarios`."""
+"""`forestall tasks`, `forestall tasks check` and `forestall scenarios`."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 Schema = Annotated[bool, Parameter(name="--schema", negative="")]
 
 
-def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
+tasks = App(name="tasks", help="List the shipped tasks; check a file of your own.")
+
+
+@tasks.default
+def list_tasks(*, as_json: Json = False, schema: Schema = False) -> int:
     """List the shipped tasks.
 
     Args:
@@ -46,6 +51,39 @@ def tasks(*, as_json: Json = False, schema: Schema = False) -> int:
     return 0
 
 
+@tasks.command
+def check(
+    file: Path,
+    /,
+    *,
+    task: str | None = None,
+    domain: str | None = None,
+    as_json: Json = False,
+) -> int:
+    """Say everything that is wrong with a task or scenario file, with what would be valid.
+
+    Exit code 0: nothing is; 1: something is; 2: there is no such file.
+
+    Args:
+        file: a task file, a scenario file, or one with several scenarios (docs/task-format.md).
+        task: of a scenario: a name or a file; the one that it names by default.
+        domain: what a task is read in, by name or file; the one that it names by default.
+        as_json: print JSON.
+    """
+    from forestall.domain.load import load_domain
+    from forestall.tasks.checking import check_file
+
+    checked = check_file(file, task, None if domain is None else load_domain(domain))
+    if as_json:
+        print(json.dumps({"kind": checked.kind, "faults": checked.faults}, indent=2))
+        return 1 if checked.faults else 0
+    for fault in checked.faults:
+        say(f"{file}: {fault}")
+    count = len(checked.faults)
+    say(f"{count} {'fault' if count == 1 else 'faults'}" if count else f"ok: a {checked.kind}")
+    return 1 if count else 0
+
+
 def scenarios(
     *,
     task: str | None = None,
@@ -57,7 +95,8 @@ def scenarios(
 
     Args:
         task: only those of one task.
-        of: which set (see `forestall cases list`; examples by default), or all.
+        of: which set, or all: examples (by default), robofail, irreversible, harmless, everyday,
+            composed, midrun, double, planner, planner-harmless, eyes, hidden, long.
         as_json: print them as JSON, complete.
         schema: print the JSON schema of scenario files instead.
     """

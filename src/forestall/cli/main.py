@@ -65,11 +65,14 @@ def _answered(arguments: Sequence[str]) -> int:
 def _told(error: BaseException) -> tuple[str, int]:
     """What is said of an error, and its code."""
     from forestall.errors import ForestallError, InputError, PerceptionError
+    from forestall.extras import missed
 
     if isinstance(error, InputError | PerceptionError):
         return str(error), 2
     if isinstance(error, ForestallError | OSError):
         return str(error), 3
+    if (lacking := missed(error)) is not None:
+        return lacking, 2
     place = error.__traceback__
     while place is not None and place.tb_next is not None:
         place = place.tb_next

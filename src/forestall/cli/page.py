@@ -1,4 +1,4 @@
-"""`forestall page`: the page of a run, drawn again from its record."""
+"""`forestall page` and `forestall gallery`: runs drawn again from their records."""
 
 from __future__ import annotations
 
@@ -18,4 +18,20 @@ def page(run: Path, /, *, out: Path | None = None) -> int:
     record = read_record(run)
     folder = run if run.is_dir() else run.parent
     print(write_page(record, out or folder / "index.html", folder))
+    return 0
+
+
+def gallery(out: Path, /, *runs: Path) -> int:
+    """Show runs that went wrong on one Markdown page: what was seen, said and done instead.
+
+    Args:
+        out: the folder to write gallery.md and its pictures to.
+        runs: folders of runs in which there was an alarm, in the order of the page.
+    """
+    from forestall.errors import InputError
+    from forestall.report.gallery import write_gallery
+
+    if not runs:
+        raise InputError("no run was named: give the folder of at least one")
+    print(write_gallery(out, runs))
     return 0

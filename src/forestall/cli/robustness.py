@@ -53,7 +53,8 @@ def robustness(
         disturbance: only these: camera, depth, pose, outline, missed, mislabelled, identities,
             small, realistic.
         profile: of the household: kind or honest.
-        judge: whose alarms are counted: scene-graph, preconditions, plan-check, ...
+        judge: whose alarms are counted: scene-graph, preconditions, plan-check, objects, caption or
+            image.
         jobs: how many episodes at once; one for each core by default.
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes), ray, or inline (this process, one after the other).

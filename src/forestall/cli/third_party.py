@@ -41,7 +41,7 @@ def third_party(
     household's own. See docs/third-party.md.
 
     Args:
-        household: whose programs.
+        household: whose programs: virtualhome.
         packages: folder in which its packages were installed; where Python finds them by default.
         development: judge the tasks on which things may be set, and not those that are reported.
         pooled: judge also with the demonstrations of all tasks, which takes ten times as long.

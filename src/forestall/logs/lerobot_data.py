@@ -14,13 +14,13 @@ from typing import Any
 from forestall.config import DEFAULT_DOMAIN
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, ForestallError, UnknownNameError
+from forestall.extras import need
 from forestall.logs.about import PARTS, recorded
 from forestall.logs.layout import Columns, CsvStep, Step, read_layout, read_steps, status_of
 from forestall.logs.lerobot_in import OWN, Looking
 from forestall.logs.lerobot_meta import Episode, Meta, read_episodes, read_meta
 from forestall.logs.lerobot_out import DETECTIONS, LOOK
 from forestall.logs.moments import chosen, moments_of
-from forestall.logs.needed import needed
 from forestall.types.recorded import RecordedRun, Unread
 
 _SUCCESS = "next.success"
@@ -47,7 +47,7 @@ class LeRobotData:
     def __init__(
         self, folder: Path, *, layout: Path | None = None, steps: Path | None = None
     ) -> None:
-        needed("pyarrow")
+        need("a LeRobot data set", "lerobot", "pyarrow")
         self._meta = read_meta(folder)
         self._layout = read_layout(layout)
         self._steps = None if steps is None else read_steps(steps)

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from forestall.errors import InputError
+from forestall.extras import need
 from forestall.files import replace_file
-from forestall.logs.needed import needed
 from forestall.logs.outlines import detections_of, numbered
 from forestall.logs.told import hand_json
 from forestall.logs.writing import Executed, Head
@@ -63,7 +63,7 @@ class LeRobotWriter:
     """
 
     def __init__(self, path: Path) -> None:
-        needed("pyarrow")
+        need("a LeRobot data set", "lerobot", "pyarrow")
         if path.exists():
             raise InputError(f"{path} is there already: name a new folder")
         self._path = path

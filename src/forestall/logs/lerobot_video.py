@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from forestall.errors import FileFormatError
-from forestall.logs.needed import needed
+from forestall.extras import need
 from forestall.reading.files import decoding
 from forestall.reading.pictures import MOST_PIXELS
 from forestall.types.observation import Depth
@@ -39,7 +39,7 @@ def frames_at(
     Raises:
         FileFormatError: no video, one of pictures too large, cut off, or no frame at a time.
     """
-    needed("av")
+    need("a video", "lerobot", "av")
     import av
 
     if not file.is_file():

@@ -14,6 +14,7 @@ from typing import Any
 from forestall.config import DEFAULT_DOMAIN
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, ForestallError
+from forestall.extras import need
 from forestall.logs.about import PARTS, recorded
 from forestall.logs.layout import CsvStep, Layout, Step, read_layout, read_steps, status_of
 from forestall.logs.mcap_file import McapFile
@@ -21,7 +22,6 @@ from forestall.logs.mcap_in import Looking
 from forestall.logs.mcap_index import Index, index_of
 from forestall.logs.mcap_out import ABOUT
 from forestall.logs.moments import unseen
-from forestall.logs.needed import needed
 from forestall.types.recorded import Look, RecordedRun, Unread
 
 _EPOCH_S = 1e8
@@ -49,7 +49,7 @@ class McapLogs:
     def __init__(
         self, folder: Path, *, layout: Path | None = None, steps: Path | None = None
     ) -> None:
-        needed("mcap", "mcap_ros2")
+        need("a log in MCAP", "mcap", "mcap", "mcap_ros2")
         self._files = sorted(folder.glob("*.mcap")) if folder.is_dir() else [folder]
         self._layout = read_layout(layout)
         self._steps = None if steps is None else read_steps(steps)

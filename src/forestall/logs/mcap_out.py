@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.errors import InputError
+from forestall.extras import need
 from forestall.files import whole_file
 from forestall.logs.messages import schema_name, schema_text
-from forestall.logs.needed import needed
 from forestall.logs.outlines import box_of, detections_of, layers_of
 from forestall.logs.writing import Executed, Head
 from forestall.types.observation import Detection, Frame, GripperState, Observation, Vec3
@@ -49,7 +49,7 @@ class McapWriter:
     """
 
     def __init__(self, path: Path) -> None:
-        needed("mcap", "mcap_ros2")
+        need("a log in MCAP", "mcap", "mcap", "mcap_ros2")
         if path.exists():
             raise InputError(f"{path} is there already: name a new file")
         self._path, self._open = path, ExitStack()

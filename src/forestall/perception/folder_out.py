@@ -72,15 +72,17 @@ def _write_frame(
 ) -> dict[str, object]:
     Image.fromarray(frame.rgb).save(folder / f"rgb{tail}.png")
     np.save(folder / f"depth{tail}.npy", frame.depth_m)
-    detections: list[dict[str, object]] = []
+    detections: list[dict[str, Any]] = []
     masks: str | None = None
     if frame.detections is not None:
         masks = f"masks{tail}.npz"
         arrays: dict[str, Any] = {f"m{i}": d.mask for i, d in enumerate(frame.detections)}
         np.savez_compressed(folder / masks, **arrays)
         for key, d in zip(arrays, frame.detections, strict=True):
-            told: dict[str, object] = {"category": d.category, "instance": d.instance}
+            told: dict[str, Any] = {"category": d.category, "instance": d.instance}
             told |= {"score": d.score, "mask": key}
+            if d.states and (d.instance or not tail):  # of several frames states need an instance
+                told["states"] = dict(d.states)
             detections.append(told if d.outlined else {**told, "outlined": False})
     elif frame.instance_ids is not None:
         masks = f"masks{tail}.png"
@@ -94,7 +96,7 @@ def _write_frame(
     for detection in detections:
         known = states.get(str(detection["instance"]))
         if known:
-            detection["states"] = dict(known)
+            detection["states"] = {**detection.get("states", {}), **known}
     k = frame.intrinsics
     return {
         "intrinsics": {"fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy},

@@ -16,9 +16,6 @@ from itertools import product
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import distance_transform_cdt
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.unproject import Labels, heights, rays, strides
@@ -162,6 +159,9 @@ class _Rim:
         The last says whether what is around is another movable thing's mask. Neighbours are joined
         if no surface but a very steep one has the step between them, noise allowed for.
         """
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
         labels, depth = self.labels.ravel(), self.depth.ravel()
         core = self.core.ravel()
         height, width = self.labels.shape
@@ -286,6 +286,8 @@ class _Rim:
 
 def _depths(labels: Labels) -> npt.NDArray[np.int32]:
     """(h, w) how many pixels each one lies from the outline of its mask, 0 on it."""
+    from scipy.ndimage import distance_transform_cdt
+
     inner = np.ones(labels.shape, dtype=np.bool_)
     across = labels[:, 1:] == labels[:, :-1]
     down = labels[1:] == labels[:-1]

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft
 
 from forestall.domain.model import Domain
 from forestall.perception.coarse import Coarse
@@ -129,6 +128,8 @@ def _hit(bends: Cells, outline: Cells, reach: int) -> float:
 
 def _shifted(bends: Cells, outline: Cells, limits: GateConfig) -> tuple[tuple[int, int], float]:
     """The best shift (x, y) in cells that is none of the near ones, and its share."""
+    from scipy import fft
+
     height, width = bends.shape
     reach = min(limits.far_cells, height // 3, width // 3)
     size = (

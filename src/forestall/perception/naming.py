@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.unproject import Cloud, Labels, Points
@@ -152,6 +151,8 @@ def _assigned(
     config: PerceptionConfig,
 ) -> dict[int, str]:
     """Detection → what it shows, where something is known there."""
+    from scipy.optimize import linear_sum_assignment
+
     if not clouds or not known:
         return {}
     cost = np.array(

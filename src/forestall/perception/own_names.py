@@ -10,7 +10,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
@@ -170,6 +169,8 @@ def _found_again(
 
     Of several that it can be a thing is the one that was nearest, and that looks most like it.
     """
+    from scipy.optimize import linear_sum_assignment
+
     names: dict[str, str] = {}
     kinds = {tracks[n].category for n in fresh if n in tracks}
     for category in sorted(k for k in kinds if not domain.is_a(k, domain.roles.fixture)):

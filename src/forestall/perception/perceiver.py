@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError, PerceptionError
+from forestall.extras import need
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.foreground import own_pixels
 from forestall.perception.forgetting import remove
@@ -110,6 +111,7 @@ class GraphPerceiver:
             raise PerceptionError(
                 "the observation has no picture, only a scene graph: use the perceiver given-graph"
             )
+        need("a scene graph from pictures", "perception", "scipy")
         masked = self._masks(observation)
         given = [m.detections for m in masked]
         tracks, held = self._memory.tracks, self._memory.held

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation, label
 
 from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
@@ -129,6 +128,8 @@ def _needed(
     look: _Lattice, things: Sequence[int], known: Sequence[Corners], config: PerceptionConfig
 ) -> Iterator[tuple[float, Flags]]:
     """Height and cells of each level surface on which a thing stands that nothing else carries."""
+    from scipy.ndimage import binary_dilation, label
+
     level = look.level()
     if int(level.sum()) < config.surface_cells:
         return

@@ -49,12 +49,13 @@ def sentence(error: ValidationError) -> str:
     told = []
     for fault in error.errors(include_url=False)[:3]:
         place = ".".join(map(str, fault["loc"])) or "the document"
-        found = "" if fault["type"] in ("missing", "extra_forbidden") else _found(fault["input"])
-        told.append(f"{place}: {fault['msg']}{found}")
+        value = "" if fault["type"] in ("missing", "extra_forbidden") else found(fault["input"])
+        told.append(f"{place}: {fault['msg']}{value}")
     more = error.error_count() - len(told)
     return "; ".join(told) + (f"; and {more} more" if more else "")
 
 
-def _found(value: Any) -> str:
+def found(value: Any) -> str:
+    """What was there instead, shortened, for the end of a sentence."""
     text = repr(value)
     return f", got {text if len(text) <= 60 else text[:57] + '...'}"

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from markupsafe import escape
 
+from forestall.extras import need
+
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -84,6 +86,7 @@ def colours_css() -> str:
 @contextmanager
 def styled() -> Iterator[None]:
     """Within it figures are drawn in this style; nothing of it stays behind."""
+    need("a figure", "figures")
     import matplotlib as mpl
 
     settings: dict[Any, Any] = {

@@ -19,7 +19,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from forestall.types.observation import Depth, Intrinsics
 
@@ -40,6 +39,8 @@ def perfect(depth_m: Depth, camera: Intrinsics, rng: np.random.Generator) -> Dep
 
 def stereo(depth_m: Depth, camera: Intrinsics, rng: np.random.Generator) -> Depth:
     """An active stereo camera: noise by the square of distance, holes at edges and in blobs."""
+    from scipy import ndimage
+
     z = depth_m.astype(np.float64)
     rough = ndimage.gaussian_filter(rng.normal(size=z.shape), 0.7)
     rough /= rough.std()
@@ -68,6 +69,8 @@ def structured_light(depth_m: Depth, camera: Intrinsics, rng: np.random.Generato
 
 def time_of_flight(depth_m: Depth, camera: Intrinsics, rng: np.random.Generator) -> Depth:
     """A Kinect v2: noise that grows with distance and slant, mixed pixels at edges."""
+    from scipy import ndimage
+
     z = depth_m.astype(np.float64)
     slope = np.hypot(*np.gradient(z)) * camera.fx / np.maximum(z, 0.1)
     slant = np.minimum(np.arctan(slope), np.deg2rad(80.0))
@@ -90,6 +93,8 @@ DEPTH_CAMERAS: Mapping[str, DepthCamera] = {
 
 def _edges(depth_m: Depth) -> npt.NDArray[np.bool_]:
     """(H, W) pixels at a step of depth."""
+    from scipy import ndimage
+
     far = ndimage.maximum_filter(depth_m, 3)
     near = ndimage.minimum_filter(depth_m, 3)
     edges: npt.NDArray[np.bool_] = far - near > _EDGE * np.maximum(near, 0.1)

@@ -9,21 +9,22 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from forestall.types.facts import category_of
 
 Ids = npt.NDArray[np.int32]
 
-_SQUARE = ndimage.generate_binary_structure(2, 1)
 _WRONG = 900  # numbers of things that are not there
 
 
 def moved_outlines(ids: Ids, most_px: int, rng: np.random.Generator) -> Ids:
     """Every mask too wide or too narrow by up to so many pixels; later ones lie over earlier."""
+    from scipy import ndimage
+
     found = ids.copy()
     if most_px == 0:
         return found
+    square = ndimage.generate_binary_structure(2, 1)
     boxes = ndimage.find_objects(ids + 1)
     for i in rng.permutation(np.unique(ids[ids >= 0])).tolist():
         by = int(rng.integers(-most_px, most_px + 1))
@@ -32,9 +33,9 @@ def moved_outlines(ids: Ids, most_px: int, rng: np.random.Generator) -> Ids:
         window = tuple(slice(max(0, s.start - most_px), s.stop + most_px) for s in boxes[i])
         mask = ids[window] == i
         if by > 0:
-            found[window][ndimage.binary_dilation(mask, _SQUARE, iterations=by)] = i
+            found[window][ndimage.binary_dilation(mask, square, iterations=by)] = i
         else:
-            inner = ndimage.binary_erosion(mask, _SQUARE, iterations=-by, border_value=1)
+            inner = ndimage.binary_erosion(mask, square, iterations=-by, border_value=1)
             found[window][mask & ~inner & (found[window] == i)] = -1
     return found
 

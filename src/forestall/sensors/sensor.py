@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
-from scipy.spatial.transform import Rotation
 
 from forestall.errors import InputError, UnknownNameError
 from forestall.sensors.depth import DEPTH_CAMERAS
@@ -138,6 +136,8 @@ def _noisy(depth_m: Depth, at_1_m: float, rng: np.random.Generator) -> Depth:
 
 def _mounted(pose: Pose, errors: Errors, rng: np.random.Generator) -> Pose:
     """Where the robot believes its camera to be."""
+    from scipy.spatial.transform import Rotation
+
     turn, shift = rng.normal(size=3), rng.normal(size=3)
     if errors.pose_cm == 0 and errors.pose_deg == 0:
         return pose
@@ -151,6 +151,8 @@ def _mounted(pose: Pose, errors: Errors, rng: np.random.Generator) -> Pose:
 
 def _exposed(rgb: Rgb, errors: Errors, rng: np.random.Generator) -> Rgb:
     """Colours with exposure, motion blur and noise."""
+    from scipy import ndimage
+
     if errors.gain == 0 and errors.blur_px == 0 and errors.colour_noise == 0:
         return rgb
     values: npt.NDArray[np.floating[Any]] = rgb * (1 + errors.gain * rng.uniform(-1, 1))

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, norm
 
 from forestall.errors import InputError
 
@@ -257,6 +256,8 @@ def _two_sided(value: float, drawn: Floats) -> float:
     Not by counting draws beyond 0: of 2000, that is never below 0.001, which no correction for
     many comparisons would leave anything of.
     """
+    from scipy.stats import norm
+
     deviation = float(drawn.std())
     if deviation == 0:
         return 1.0 if value == 0 else 2 / (len(drawn) + 1)
@@ -335,6 +336,8 @@ def _numbered(values: Sequence[Hashable | None]) -> Ints:
 
 @lru_cache(maxsize=10_000)
 def _clopper_pearson(good: int, n: int) -> tuple[float, float]:
+    from scipy.stats import binomtest
+
     interval = binomtest(good, n).proportion_ci(LEVEL)
     return float(interval.low), float(interval.high)
 

@@ -9,8 +9,6 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scipy.stats import binomtest
-
 from forestall.errors import InputError
 from forestall.statistics.intervals import Clusters, Metric, measured, of_runs
 
@@ -49,6 +47,8 @@ def paired(first: Sequence[bool], second: Sequence[bool], units: Sequence[Hashab
     Raises:
         InputError: the sequences differ in length.
     """
+    from scipy.stats import binomtest
+
     if not len(first) == len(second) == len(units):
         raise InputError("pairs need as many first as second outcomes, and their rooms")
     parts = {"first": of_runs(first), "second": of_runs(second)}

@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, logit
-from scipy.stats import binomtest, t
 
 from forestall.statistics.intervals import EXACT, LEVEL, NOTHING, Metric
 from forestall.study.agreement import alpha, strengths
@@ -120,6 +118,9 @@ def share_of(found: Sequence[Comparison], values: Sequence[float]) -> Metric:
         found: the answers.
         values: one of each.
     """
+    from scipy.special import expit, logit
+    from scipy.stats import binomtest, t
+
     n = len(found)
     if n == 0:
         return NOTHING

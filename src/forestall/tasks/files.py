@@ -115,7 +115,7 @@ class Scenario:
         Raises:
             InputError: the plan has no such step.
         """
-        return _moment(self.known, plan), _moment(self.effect, plan)
+        return moment(self.known, plan), moment(self.effect, plan)
 
 
 def schemas() -> dict[str, Any]:
@@ -164,7 +164,7 @@ def load_task(name_or_file: str, domain: Domain | None = None) -> LoadedTask:
     source, text, own = _read("tasks", "task", name_or_file)
     data = _validated(TaskFile, source, text)
     if domain is None:
-        return _task(source, data, lambda: load_domain(_beside(source, data.domain or own)))
+        return _task(source, data, lambda: load_domain(beside(source, data.domain or own)))
     other = f"{source} does not fit the domain {domain.name!r}"
     return _task(other, data, lambda: domain)
 
@@ -220,7 +220,12 @@ def _scenario(data: ScenarioFields, task: str, set_name: str, domain: str = "") 
     )
 
 
-def _moment(text: str | None, plan: Plan) -> int | None:
+def moment(text: str | None, plan: Plan) -> int | None:
+    """Where a moment as scenario files write it is in a plan, from 0; None for none.
+
+    Raises:
+        InputError: the plan has no such step.
+    """
     if text is None:
         return None
     if text == END:
@@ -278,7 +283,7 @@ def _task(source: str, data: TaskFile, read_in: Callable[[], Domain]) -> LoadedT
     return LoadedTask(task, domain)
 
 
-def _beside(source: str, name: str) -> str:
+def beside(source: str, name: str) -> str:
     """A domain file is found from the task file that names it, wherever one works."""
     return str(Path(source).parent / name) if name.endswith((".toml", ".pddl")) else name
 
@@ -301,7 +306,7 @@ def goal_from(data: GoalFile, domain: Domain) -> Goal:
         domain[category]
 
     def facts(texts: list[str]) -> tuple[Fact, ...]:
-        return tuple(_fact(t, data.variables, domain) for t in texts)
+        return tuple(goal_fact(t, data.variables, domain) for t in texts)
 
     return Goal(
         text=data.text,
@@ -312,7 +317,12 @@ def goal_from(data: GoalFile, domain: Domain) -> Goal:
     )
 
 
-def _fact(text: str, variables: Mapping[str, str], domain: Domain) -> Fact:
+def goal_fact(text: str, variables: Mapping[str, str], domain: Domain) -> Fact:
+    """A fact of a goal, every name checked.
+
+    Raises:
+        InputError: a name that means nothing, or a fact that nothing can meet.
+    """
     fact = Fact.parse(text)
     check_literal(domain, "goal", fact)
     for name in fact.args:
@@ -348,7 +358,7 @@ def _scene(data: SceneFile, domain: Domain) -> SceneNeeds:
         category = domain[need.category].name
         for place in need.places:
             domain[place]
-        _check_states(category, need.states, domain)
+        check_states(category, need.states, domain)
         numbers[category] = numbers.get(category, 0) + 1
         objects.append(
             ObjectNeed(
@@ -361,13 +371,18 @@ def _scene(data: SceneFile, domain: Domain) -> SceneNeeds:
         )
     overrides = []
     for name, states in data.fixtures.items():
-        _check_states(name, states, domain)
+        check_states(name, states, domain)
         instance = name if is_instance(name) else f"{domain[name].name}-1"
         overrides += [(instance, a, v) for a, v in sorted(states.items())]
     return SceneNeeds(data.room, tuple(objects), tuple(overrides), data.clutter)
 
 
-def _check_states(name: str, states: Mapping[str, str], domain: Domain) -> None:
+def check_states(name: str, states: Mapping[str, str], domain: Domain) -> None:
+    """See that a thing can have these states.
+
+    Raises:
+        InputError: no such thing, attribute or value.
+    """
     category = domain[category_of(name)]
     for attribute, value in states.items():
         if attribute not in category.attributes:

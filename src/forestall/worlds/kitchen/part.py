@@ -9,16 +9,20 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
+from forestall.extras import need
 from forestall.types.scene import SceneNeeds
 from forestall.types.world import Working
-from forestall.worlds.kitchen.environment import KitchenEnvironment, KitchenOracle
 from forestall.worlds.kitchen.imperfection import Rates
 from forestall.worlds.kitchen.ithor import draws
 from forestall.worlds.kitchen.law import WAYS
 from forestall.worlds.kitchen.rendering import RENDERERS, FrameMemory
+
+if TYPE_CHECKING:
+    from forestall.worlds.kitchen.environment import KitchenEnvironment, KitchenOracle
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +89,7 @@ class Kitchens:
 
     Raises:
         UnknownNameError: no such renderer.
-        InputError: rates for a profile in which nothing goes wrong.
+        InputError: rates for a profile in which nothing goes wrong, or MuJoCo is not installed.
     """
 
     name = "kitchen"
@@ -99,6 +103,7 @@ class Kitchens:
         rooms: Rooms = Rooms.OWN,
         names: NamesOption = NamesOption.PROFILE,
     ) -> None:
+        need(f"the world {self.name}", "kitchen", "mujoco")
         if renderer not in RENDERERS:
             raise UnknownNameError("renderer", renderer, RENDERERS)
         honest = profile is Profile.HONEST
@@ -118,6 +123,8 @@ class Kitchens:
         self, needs: SceneNeeds, domain: Domain, remember: bool = False
     ) -> Iterator[OpenKitchen]:
         """See the Protocol."""
+        from forestall.worlds.kitchen.environment import KitchenEnvironment
+
         frames = self._frames if remember else None
         kitchen = KitchenEnvironment(
             needs,
