@@ -16,7 +16,9 @@ PATH = re.compile(r"`([\w./-]+\.(?:py|md|toml|jsonl?|jinja))`|\]\(([\w./-]+)\)")
 MADE_BY_USERS = {
     "observation.json", "record.json", "boundaries.jsonl", "runs/episodes.jsonl", "ladle-lost.toml",
     "fetch-ladle.toml", "episodes.jsonl", "experiment.json", "effort.jsonl", "summary.json",
-    "task.json", "001.json", "OUT/failing.json", "OUT/report.json",
+    "task.json", "001.json", "OUT/failing.json", "OUT/report.json", "run.json", "meta/info.json",
+    "scene.json", "data/tasks/TASK.json",
+    "graph.json", "perception.json", "config.json", "preprocessor_config.json",
 }  # fmt: skip
 
 

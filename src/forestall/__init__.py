@@ -18,6 +18,8 @@ from forestall.types.drawing import drawn_by as _drawn_by
 
 if TYPE_CHECKING:
     from forestall.assembly.monitor import Monitor as Monitor
+    from forestall.assembly.opening import OpenTask as OpenTask
+    from forestall.assembly.opening import open_task as open_task
     from forestall.conclusion import MonitorConfig as MonitorConfig
     from forestall.domain.load import load_domain as load_domain
     from forestall.domain.model import Domain as Domain
@@ -97,6 +99,7 @@ _PUBLIC = {
     "ObjectNode": "types.graph",
     "Observation": "types.observation",
     "ObservationError": "errors",
+    "OpenTask": "assembly.opening",
     "Outcome": "types.decision",
     "PartError": "errors",
     "Picture": "perception.scenes",
@@ -114,6 +117,7 @@ _PUBLIC = {
     "learn": "learning.learn",
     "load_domain": "domain.load",
     "open_memory": "memory.store:open_store",
+    "open_task": "assembly.opening",
     "scene_graph": "types.symbolic",
 }
 """Public name → module, and behind a colon what it is called there, where that differs."""
@@ -147,6 +151,7 @@ __all__ = [
     "ObjectNode",
     "Observation",
     "ObservationError",
+    "OpenTask",
     "Outcome",
     "PartError",
     "Picture",
@@ -164,6 +169,7 @@ __all__ = [
     "learn",
     "load_domain",
     "open_memory",
+    "open_task",
     "scene_graph",
 ]
 

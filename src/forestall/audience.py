@@ -31,9 +31,11 @@ class Audience:
         self._seats = tuple(_Seat(listener) for listener in listeners)
         self._limit_s = limit_s
 
-    def tell(self, what: str, *about: Any) -> None:
-        """Tell all, e.g. "on_boundary"; one that is late hears it when it comes back."""
+    def tell(self, what: str, *about: Any, to: type = object) -> None:
+        """Tell all of a type, e.g. "on_boundary"; one that is late hears it when it comes back."""
         for seat in self._seats:
+            if not isinstance(seat.listener, to):
+                continue
             was_late = seat.late
             seat.tell(what, about)
             if not was_late:
@@ -67,7 +69,7 @@ class _Seat:
     """One listener and the thread on which it is told."""
 
     def __init__(self, listener: Listener) -> None:
-        self._listener = listener
+        self.listener = listener
         self._name = f"listener {listener.__class__.__name__}"
         self._said: queue.SimpleQueue[_Said | None] = queue.SimpleQueue()
         self._open = 0
@@ -119,7 +121,7 @@ class _Seat:
             with self._lock:
                 self._now = what
             try:
-                getattr(self._listener, what)(*about)
+                getattr(self.listener, what)(*about)
             except BaseException as error:  # noqa: BLE001 - a listener cannot change an episode
                 with self._lock:
                     self._failed.setdefault(what, []).append(in_words(error))

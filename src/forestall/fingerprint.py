@@ -27,7 +27,8 @@ RUNNING = ("cases", "rows")
 
 def weights_of(names: Iterable[str]) -> list[tuple[str, str]]:
     """Which weights of others are meant by parts that read some: FORESTALL_CLIP for "clip"."""
-    found = ((name, os.environ.get(f"FORESTALL_{name.upper()}")) for name in sorted(set(names)))
+    told = {name: f"FORESTALL_{name.upper().replace('-', '_')}" for name in sorted(set(names))}
+    found = ((name, os.environ.get(variable)) for name, variable in told.items())
     return [(name, folder) for name, folder in found if folder]
 
 

@@ -13,8 +13,10 @@ from forestall.seams import (
     Detector,
     Expectations,
     Eye,
+    Finder,
     ImageTextEncoder,
     LanguageModel,
+    Outliner,
     Perceiver,
     PlanValidator,
     Reasoner,
@@ -33,6 +35,8 @@ WORLD = Kind[WorldPart]("world", WorldPart)
 SENSOR = Kind[Eye]("sensor", Eye)
 DOMAIN = Kind[Domain]("domain", Domain)
 SEGMENTER = Kind[Segmenter]("segmenter", Segmenter)
+FINDER = Kind[Finder]("finder", Finder)
+OUTLINER = Kind[Outliner]("outliner", Outliner)
 STATES = Kind[StateEstimator]("states", StateEstimator)
 PERCEIVER = Kind[Perceiver]("perceiver", Perceiver)
 TEXT_ENCODER = Kind[TextEncoder]("text-encoder", TextEncoder)

@@ -18,6 +18,7 @@ from forestall.conclusion import MonitorConfig
 from forestall.errors import PartError
 from forestall.monitor import Monitor
 from forestall.records.plain import plain
+from forestall.seams import LookListener
 from forestall.supervised import SupervisedWorld, described
 from forestall.supervision import Limits, Supervisor, part_error
 from forestall.types.decision import Hold, MonitorDecision, Outcome
@@ -97,6 +98,10 @@ class _Episode:
     time_s: float = 0.0
     trouble: Trouble | None = None
     notes: list[str] = field(default_factory=list)
+
+    def looked(self, observation: Observation) -> None:
+        """Tell whoever keeps all that was seen."""
+        self.audience.tell("on_look", observation, to=LookListener)
 
 
 class Runtime:
@@ -199,7 +204,7 @@ class Runtime:
             self._world.reset(seed)
             with monitor.phase("observe"):
                 around = self._world.scan()
-            self._remember(around)
+            self._remember(episode, around)
             return self._loop(episode)
         except PartError as error:
             episode.trouble = _trouble(error)
@@ -241,14 +246,17 @@ class Runtime:
             )
         return scored
 
-    def _remember(self, around: Observation) -> None:
+    def _remember(self, episode: _Episode, around: Observation) -> None:
         """The first look; what cannot be believed is looked at once more."""
+        episode.looked(around)
         try:
             self._monitor.observe(around)
         except PartError as error:
             if not error.senses or self._config.max_looks < 2:
                 raise
-            self._monitor.observe(self._world.scan(thorough=True))
+            around = self._world.scan(thorough=True)
+            episode.looked(around)
+            self._monitor.observe(around)
 
     def _loop(self, episode: _Episode) -> EpisodeEnd:
         monitor = self._monitor
@@ -312,6 +320,7 @@ class Runtime:
         with self._monitor.phase("observe"):
             observation = world.observe(self._monitor.wanted_views())
         while True:
+            episode.looked(observation)
             decision = ask(observation)
             self._note(episode, decision)
             if decision.outcome is not Outcome.LOOK:

@@ -26,8 +26,9 @@ from forestall.types.episode import (
 )
 from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
-from forestall.types.foreign import ForeignRun
+from forestall.types.foreign import ForeignPlan, ForeignRun
 from forestall.types.graph import SceneGraph
+from forestall.types.grounding import Corners, GroundedBox
 from forestall.types.kind import Kind
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb, Vec3
 from forestall.types.plan import Plan, Subtask
@@ -209,19 +210,39 @@ class Foreign(Protocol):
 
 
 class DataSet(Protocol):
-    """Runs that somebody else recorded, in a folder; made with the folder."""
+    """Runs that somebody else recorded, in a folder; made with the folder, and its own options."""
 
     name: str
     domain: str
     """The name of the domain in whose words its plans are."""
     options: Mapping[str, Mapping[str, Any]]
     """Kind of part → options that its pictures need."""
+    parts: Mapping[str, str]
+    """Kind of part → the part that they need, where it is not the one of stored scenes."""
 
     def __len__(self) -> int:
         """How many runs there may be."""
 
     def runs(self, domain: Domain) -> Iterator[RecordedRun | Unread]:
         """Each run, or why it cannot be used."""
+
+
+class PlanSet(Protocol):
+    """Plans that somebody else wrote and what must never be so around their steps.
+
+    Made with a file or a folder. A plan in whose domain something is left out says what.
+    """
+
+    name: str
+
+    def __len__(self) -> int:
+        """How many plans there may be."""
+
+    def plans(self) -> Iterator[ForeignPlan | Unread]:
+        """Each plan, or why it cannot be converted."""
+
+    def domain(self, plan: ForeignPlan) -> Domain:
+        """What a plan's steps need and do, and its safety rules; plans may share one."""
 
 
 class Parts(Protocol):
@@ -304,12 +325,42 @@ class Renderer(Protocol):
 
 
 class Segmenter(Protocol):
-    """Finds instances in a frame."""
+    """Finds instances in a frame.
+
+    One with a method `segment_all(frames)`, an answer for each, is asked for all frames of an
+    observation at once. One whose `tracks` is False has no names of its own for things: the world
+    is then spoken to as one that keeps its names to itself.
+    """
 
     name: str
 
     def segment(self, frame: Frame) -> Sequence[Detection]:
         """Instance masks with categories; the same instance name over frames when it tracks."""
+
+
+class Finder(Protocol):
+    """Finds in pictures what phrases name: boxes, without outlines.
+
+    `vocabulary` is all that it can be asked for, None for one that takes any phrase.
+    """
+
+    name: str
+    vocabulary: Sequence[str] | None
+
+    def find(
+        self, pictures: Sequence[Rgb], phrases: Sequence[str]
+    ) -> Sequence[Sequence[GroundedBox]]:
+        """For each picture what was found in it; several boxes may be of one thing."""
+
+
+class Outliner(Protocol):
+    """Turns boxes into masks; `exact`: a mask ends where its thing ends."""
+
+    name: str
+    exact: bool
+
+    def outline(self, frame: Frame, boxes: Sequence[Corners]) -> Sequence[Mask]:
+        """For each box the (H, W) mask of the thing in it; an empty one where there is none."""
 
 
 class StateEstimator(Protocol):
@@ -526,6 +577,14 @@ class Listener(Protocol):
 
     def on_end(self, record: EpisodeRecord) -> None:
         """The episode is over."""
+
+
+@runtime_checkable
+class LookListener(Protocol):
+    """A listener that is told of every look, too, beside `Listener`: a log of what was seen."""
+
+    def on_look(self, observation: Observation) -> None:
+        """The robot has looked; nothing is believed of it yet."""
 
 
 class GoalChecker(Protocol):

@@ -11,13 +11,20 @@ import pytest
 from assembly.plain_parts import FlatWorlds
 from forestall.assembly.configuration import Given, RunConfig, run_config
 from forestall.assembly.demonstrations import load_memory, memory_path, ready_made
-from forestall.assembly.make import make_world, needs_memory, prepare, run_episode
+from forestall.assembly.make import (
+    make_environment,
+    make_world,
+    needs_memory,
+    prepare,
+    run_episode,
+)
 from forestall.assembly.recording import RecordingJob, jobs_for, record_one
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.domain.load import shipped
 from forestall.errors import InputError, MemoryFileError
 from forestall.kinds import WORLD
+from forestall.tasks.edge import WorldsEdge
 from forestall.types.demonstration import Demonstration
 
 PLAIN = Given.named(
@@ -121,7 +128,7 @@ def test_the_command_runs_in_any_world(tmp_path: Path, capsys: pytest.CaptureFix
     config = json.loads(capsys.readouterr().out)["provenance"]["config"]
     assert config["parts"]["world"]["given"] == {"gravity": 1.6}
     assert call(["run", "heat-potato", "--world", "kitchn"]) == 2
-    assert "known: ai2thor, kitchen" in capsys.readouterr().err
+    assert "known: ai2thor, frankakitchen, kitchen" in capsys.readouterr().err
     assert call(["run", "heat-potato", *parts[:2], "--renderer", "rays"]) == 2
     assert "'renderer': known: gravity" in capsys.readouterr().err
 
@@ -135,3 +142,14 @@ def test_parts_are_listed_with_their_options(capsys: pytest.CaptureFixture[str])
     assert json.loads(capsys.readouterr().out)["world"]["kitchen"]["renderer"] == "auto"
     assert call(["parts", "detectors"]) == 2
     assert "did you mean detector" in capsys.readouterr().err
+
+
+def test_a_segmenter_without_names_of_the_worlds_speaks_to_it_through_an_edge() -> None:
+    shades = {"name": "vision.shades:Shades", "words": "mug"}
+    config = run_config(
+        "heat-potato", segmenter="finder", finder=shades, world="symbolic", states="oracle"
+    )
+    prepared = prepare(config)
+    loaded = prepared.loaded
+    with make_world(prepared.config, loaded.domain).open(loaded.task.scene, loaded.domain) as world:
+        assert isinstance(make_environment(prepared, world), WorldsEdge)

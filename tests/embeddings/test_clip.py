@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from forestall.embeddings.clip import ClipEncoder, _picture
+from forestall.embeddings.clip import ClipEncoder
+from forestall.embeddings.contrastive import shown
 from forestall.embeddings.crops import crop
 from forestall.errors import InputError, ModelFileError
 
@@ -109,7 +110,7 @@ def test_the_model_is_computed_as_transformers_does(folder: Path, clip: ClipEnco
     with torch.inference_mode():
         answer = model(
             **tokenizer(["a mug", "a tv that is on"], padding=True, return_tensors="pt"),
-            **processor([_picture(crop(rgb, m, PIXELS)) for m in masks], return_tensors="pt"),
+            **processor([shown(crop(rgb, m, PIXELS)) for m in masks], return_tensors="pt"),
         )
     logits = clip.encode_crops(rgb, masks) @ clip.encode(["a mug", "a tv that is on"]).T
     logits = clip.reading.scale * logits
@@ -143,12 +144,12 @@ def test_an_empty_mask_gives_a_row(clip: ClipEncoder) -> None:
 def test_only_what_lies_around_is_blurred() -> None:
     rgb, masks = scene()
     cut = crop(rgb, masks[1], 112)
-    shown = np.asarray(_picture(cut)).astype(int)
+    picture = np.asarray(shown(cut)).astype(int)
     inside, outside = cut[..., 3] == 255, cut[..., 3] == 0
     assert inside.any() and outside.any()
-    assert np.array_equal(shown[inside], cut[..., :3][inside])
+    assert np.array_equal(picture[inside], cut[..., :3][inside])
     sharp = np.asarray(Image.fromarray(cut[..., :3])).astype(int)
-    assert shown[outside].std() < 0.5 * sharp[outside].std()
+    assert picture[outside].std() < 0.5 * sharp[outside].std()
 
 
 def test_reading_and_name(clip: ClipEncoder, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
 from forestall.assembly.corrections import described, remembering
 from forestall.assembly.make import STORED_STATES, provenance
+from forestall.assembly.other_eyes import other_eyes
 from forestall.assembly.own_domain import domain_of_demonstrations
 from forestall.assembly.parts import Assembly
 from forestall.assembly.plans import fitting, read_plan
@@ -40,6 +41,8 @@ from forestall.types.episode import (
     SkillStatus,
 )
 from forestall.types.facts import category_of, is_instance
+from forestall.types.graph import SceneGraph
+from forestall.types.observation import Observation
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext
 from forestall.types.scene import SceneNeeds
@@ -94,12 +97,14 @@ class Judgement:
 class Judgements:
     """Every scene's, and the record from which the page is drawn.
 
-    `limits` say what cannot be judged because the domain was learnt from the demonstrations.
+    `limits` say what cannot be judged because the domain was learnt from the demonstrations, `eyes`
+    that these were seen with other parts than the scenes; "" where they were not.
     """
 
     each: tuple[Judgement, ...]
     record: EpisodeRecord
     limits: tuple[str, ...] = ()
+    eyes: str = ""
 
     @property
     def outcome(self) -> Outcome:
@@ -155,7 +160,7 @@ def judge_stored(
     lent = {"states": stated, "task": task.name}
     parts = Assembly(choices, domain, demonstrations, lent)
     bounds = MonitorConfig(max_subtasks=len(scenes), max_replans=0)
-    strategy, perceiver = _strategy(parts, len(scenes)), parts.part(PERCEIVER)
+    strategy, perceiver = strategy_of(parts, len(scenes)), parts.part(PERCEIVER)
     monitor = Monitor(strategy, domain, perceiver, bounds)
     monitor.start(task)
     found: list[Judgement] = []
@@ -163,7 +168,10 @@ def judge_stored(
     for stored in _read(scenes, domain, stated, learnt=bool(limits)):
         if found and wanted is None:
             passed.append(_passed(monitor, found[-1].record, stored))
-        found.append(_judgement(stored.path, _asked(monitor, stored, wanted), pictures, domain))
+        found.append(
+            judgement_of(stored.path, asked(monitor, stored.scene, wanted), pictures, domain)
+        )
+    eyes = other_eyes(demonstrations or (), perceiver.describe(), scenes)
     record = EpisodeRecord(
         task=task,
         scenario=STORED,
@@ -181,10 +189,11 @@ def judge_stored(
             ("memory", memory),
             ("corrections", described(config.choices, memory)),
             ("observations", [str(path) for path in scenes]),
+            ("other eyes", eyes or None),
             ("inputs", {"task": repr(task), "domain": digest_of(domain)}),
         ),
     )
-    return Judgements(tuple(found), record, limits)
+    return Judgements(tuple(found), record, limits, eyes)
 
 
 def _read(
@@ -251,7 +260,7 @@ def _task(
     return task, domain, limits
 
 
-def _strategy(parts: Assembly, scenes: int) -> Strategy:
+def strategy_of(parts: Assembly, scenes: int) -> Strategy:
     """The strategy that was chosen; as no repair is tried, it gives none up."""
     name = parts.name(STRATEGY)
     options: dict[str, Any] = {}
@@ -268,16 +277,18 @@ def _passed(monitor: Monitor, last: BoundaryRecord, following: Stored) -> Execut
     return ExecutedRecord(last.subtask, done, last.index)
 
 
-def _asked(monitor: Monitor, stored: Stored, wanted: Subtask | None) -> MonitorDecision:
+def asked(
+    monitor: Monitor, scene: Observation | SceneGraph, wanted: Subtask | None
+) -> MonitorDecision:
     """What the monitor says of a scene.
 
     Nobody looks here. Where an argument was not seen, "look" is the answer; a monitor that only
     wants to be sure is asked again with the same scene.
     """
-    decision = monitor.before(stored.scene, wanted)
+    decision = monitor.before(scene, wanted)
     if decision.outcome is not Outcome.LOOK or decision.context is None:
         return decision
-    return decision if unlocated(decision.context) else monitor.before(stored.scene, wanted)
+    return decision if unlocated(decision.context) else monitor.before(scene, wanted)
 
 
 def _meant(context: BoundaryContext, domain: Domain) -> str:
@@ -295,7 +306,9 @@ def _meant(context: BoundaryContext, domain: Domain) -> str:
     return text
 
 
-def _judgement(path: Path, decision: MonitorDecision, pictures: bool, domain: Domain) -> Judgement:
+def judgement_of(
+    path: Path, decision: MonitorDecision, pictures: bool, domain: Domain
+) -> Judgement:
     """What is kept of a decision; a plan that may not be adopted is one that is proposed."""
     record, replan, verdict = decision.record, decision.replan, decision.verdict
     assert record is not None, "what was looked at is recorded"

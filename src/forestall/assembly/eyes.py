@@ -48,6 +48,10 @@ class Eyes:
         """Whose words are matched."""
         return self._domain
 
+    def describe(self) -> Mapping[str, str]:
+        """What it sees with, for demonstrations."""
+        return self._perceiver.describe()
+
     def begin(self) -> None:
         """Another demonstration: nothing of the last one is remembered."""
         self._perceiver.reset()
@@ -98,11 +102,16 @@ def eyes_for(given: Given, domain: Domain | None = None) -> Eyes:
     Raises:
         InputError: a name or an option that is not valid.
     """
-    said = given.over(Given.named({"segmenter": "given-masks", "states": "given"}))
+    said = of_stored(given)
     own = domain_of(said.chosen(DOMAIN.name)) if domain is None else domain
     told: dict[str, Mapping[str, str]] = {}
     parts = Assembly(choices(said), own, None, {"states": told})
     return Eyes(parts.part(PERCEIVER), own, told)
+
+
+def of_stored(given: Given) -> Given:
+    """What was said about parts, over those that stored pictures have."""
+    return given.over(Given.named({"segmenter": "given-masks", "states": "given"}))
 
 
 def is_picture(given: object) -> bool:

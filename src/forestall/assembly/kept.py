@@ -18,15 +18,20 @@ from pathlib import Path
 from forestall.assembly.configuration import Given, choices, domain_of
 from forestall.assembly.parts import Assembly
 from forestall.domain.model import Domain
-from forestall.errors import InputError, MemoryFileError
+from forestall.errors import InputError, MemoryFileError, PerceptionError
 from forestall.kinds import DOMAIN, PERCEIVER
 from forestall.memory.store import open_store
 from forestall.perception.folder import read_observation, write_observation
 from forestall.seams import Perceiver
 from forestall.types.demonstration import Demonstration, DemonstrationStep
+from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Rgb
+from forestall.types.plan import Subtask
 
 _HASH = re.compile(r"^[0-9a-f]{32}$")
+
+MOVED_M = 0.1
+"""How far from the box that other eyes give a thing the former ones may have seen its middle."""
 
 
 class KeptObservations:
@@ -86,11 +91,12 @@ def perceived_anew(
     kept: KeptObservations,
     perceiver: Perceiver,
     domain: Domain,
-) -> list[Demonstration]:
+) -> tuple[list[Demonstration], list[str]]:
     """The same demonstrations as another perceiver sees them.
 
     It sees what was kept: the looks before each subtask, and nothing of looks in between. What was
-    known after the last subtask is left out.
+    known after the last subtask is left out. Where its segmenter gives names of its own, arguments
+    of subtasks are the things that stand where the former ones stood.
 
     Args:
         demonstrations: each with all its observations.
@@ -98,31 +104,58 @@ def perceived_anew(
         perceiver: sees them; it is reset for each demonstration.
         domain: of all of them.
 
+    Returns:
+        The demonstrations, and for each that it cannot see a sentence why: an argument of a subtask
+        is not where it was, or nothing is found at all.
+
     Raises:
         InputError: a step whose observation was not kept.
         MemoryFileError: an observation that is gone or damaged.
     """
-    found = []
+    found, unseen = [], []
     for d in demonstrations:
         perceiver.reset()
         steps = []
-        for step in d.steps:
-            if step.observation is None:
-                raise InputError(
-                    f"what demonstration {d.id} saw before {step.subtask} was not kept: record it "
-                    "with --keep-observations"
-                )
-            graph = perceiver.perceive(kept.get(step.observation, domain))
-            scoped = perceiver.scope(graph, step.subtask)
-            steps.append(replace(step, graph=scoped, whole=graph, view=None))
+        try:
+            for step in d.steps:
+                if step.observation is None:
+                    raise InputError(
+                        f"what demonstration {d.id} saw before {step.subtask} was not kept: record "
+                        "it with --keep-observations"
+                    )
+                graph = perceiver.perceive(kept.get(step.observation, domain))
+                subtask = _found_again(step, graph)
+                scoped = perceiver.scope(graph, subtask)
+                steps.append(replace(step, subtask=subtask, graph=scoped, whole=graph, view=None))
+        except PerceptionError as error:
+            unseen.append(f"demonstration {d.id}: {error}")
+            continue
         described = tuple(sorted(perceiver.describe().items()))
         found.append(replace(d, steps=tuple(steps), perception=described, final=None))
-    return found
+    return found, unseen
+
+
+def _found_again(step: DemonstrationStep, graph: SceneGraph) -> Subtask:
+    """The subtask of a step with the names that its things have in another graph.
+
+    Raises:
+        PerceptionError: one of them is not there.
+    """
+    args = []
+    for arg in step.subtask.args:
+        old = step.whole.get(arg)
+        again: str | None = arg
+        if old is not None and old.centroid_m is not None:
+            again = graph.nearest(old.category, old.centroid_m, MOVED_M)
+        if again is None:
+            raise PerceptionError(f"{arg} is not seen where it was before {step.subtask}")
+        args.append(again)
+    return Subtask(step.subtask.skill, tuple(args))
 
 
 def seen_anew(
     memory: Path, demonstrations: Sequence[Demonstration], given: Given
-) -> list[Demonstration]:
+) -> tuple[list[Demonstration], list[str]]:
     """What `perceived_anew` gives with the parts that somebody named.
 
     Masks are the kept ones, states are read off pictures, unless something else is said.

@@ -23,7 +23,7 @@ from forestall.assembly.registry import find, known
 from forestall.config import DEMONSTRATION_SEEDS, PICTURE_SEEDS
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.kinds import LIMIT, PERCEIVER, SENSOR, STATES, STRATEGY, WORLD
+from forestall.kinds import LIMIT, PERCEIVER, SEGMENTER, SENSOR, STATES, STRATEGY, WORLD
 from forestall.runtime import Runtime, RuntimeConfig
 from forestall.seams import Environment, Listener, OpenWorld, OracleView, Strategy, WorldPart
 from forestall.tasks.edge import WorldsEdge, named
@@ -184,9 +184,12 @@ def make_environment(prepared: Prepared, world: OpenWorld) -> Environment:
     """What the robot gets of an open world: its faults, its sensor, an edge where names end."""
     domain = prepared.loaded.domain
     faulty = wrap(world.environment, prepared.faults, world.disturbance, domain)
-    eye = Assembly(prepared.config.choices, domain).part(SENSOR)
+    lent = {"truth": world.oracle, "task": prepared.loaded.task.name}
+    parts = Assembly(prepared.config.choices, domain, None, lent)
+    eye = parts.part(SENSOR)
     seen = eye.around(faulty)
-    if getattr(world, "shares_names", True) and eye.identities:
+    named_by_world = getattr(world, "shares_names", True) and eye.identities
+    if named_by_world and getattr(parts.part(SEGMENTER), "tracks", True):
         return seen
     return WorldsEdge(seen, world.oracle.truth, domain, named(prepared.plan))
 

@@ -14,7 +14,7 @@ from forestall.assembly.options import built, checked, declared
 from forestall.assembly.registry import find, known
 from forestall.domain.model import Domain
 from forestall.errors import InputError
-from forestall.kinds import CAPTIONER, IMAGE_ENCODER, STRATEGY, TEXT_ENCODER
+from forestall.kinds import CAPTIONER, FINDER, IMAGE_ENCODER, OUTLINER, STRATEGY, TEXT_ENCODER
 from forestall.types.demonstration import Demonstration
 from forestall.types.kind import Kind
 
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 _Key = tuple[str, str, tuple[tuple[str, Any], ...]]
 
-_MODELS = frozenset({TEXT_ENCODER.name, IMAGE_ENCODER.name, CAPTIONER.name})
+_MODELS = frozenset(k.name for k in (TEXT_ENCODER, IMAGE_ENCODER, CAPTIONER, FINDER, OUTLINER))
 """Kinds whose parts are read once for each process, where they borrow nothing: it takes time."""
 
 _shared: dict[_Key, Any] = {}

@@ -6,15 +6,17 @@ Called by `forestall import` and `bench detection --data`; calls a data set (`se
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import forestall
 from forestall.assembly.configuration import Given
-from forestall.assembly.eyes import Eyes, eyes_for
+from forestall.assembly.eyes import Eyes, eyes_for, of_stored
 from forestall.assembly.registry import DATA_SETS, data_set
 from forestall.domain.model import Domain
 from forestall.errors import (
@@ -28,9 +30,10 @@ from forestall.files import replace_file
 from forestall.kinds import DOMAIN
 from forestall.memory.store import open_store
 from forestall.seams import DataSet
+from forestall.types.demonstration import Demonstration
 from forestall.types.foreign import ForeignRun
 from forestall.types.graph import SceneGraph
-from forestall.types.observation import Observation
+from forestall.types.observation import Frame, Observation
 from forestall.types.plan import Subtask
 from forestall.types.recorded import ReadReport, RecordedRun, Unread
 
@@ -60,17 +63,52 @@ class SeenRun:
         return self.recorded.fails is None
 
 
+@dataclass(frozen=True, slots=True)
+class OutlinedStep:
+    """A step of a run that would be read: when it begins, what it is, how it is said to end."""
+
+    time_s: float
+    subtask: str
+    ended: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """What would be read of a run, or why nothing.
+
+    Args:
+        name: of the run.
+        task: what it was to do.
+        fails: at which step, in words; "" for a good run.
+        looks: how many.
+        pictures: how many of which kind, in words.
+        steps: that were carried out.
+        left_out: what of it cannot be read.
+        why_not: why it cannot be used at all.
+    """
+
+    name: str
+    task: str = ""
+    fails: str = ""
+    looks: int = 0
+    pictures: str = ""
+    steps: tuple[OutlinedStep, ...] = ()
+    left_out: tuple[str, ...] = ()
+    why_not: str = ""
+
+
 def _silent(done: int, total: int, what: str) -> None:
     """Nobody is told how far it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A data set with the domain and the eyes that it is seen with."""
+    """A data set with the domain, the eyes and the parts that it is seen with."""
 
     data: DataSet
     domain: Domain
     eyes: Eyes
+    given: Given = field(default_factory=Given)
 
     def seen(self, report: ReadReport, progress: Progress = _silent) -> Iterator[SeenRun]:
         """Every run that can be used, one after the other.
@@ -97,22 +135,35 @@ class Opened:
                 report.unread.append(unread)
 
 
-def open_data(name: str, folder: Path, given: Given) -> Opened:
+def open_data(
+    name: str, folder: Path, given: Given, how: Mapping[str, Any] | None = None
+) -> Opened:
     """A data set, in its own domain where no other is said.
 
     Args:
         name: of the data set.
         folder: where it is.
         given: what was said about parts.
+        how: options of the data set itself; what is None was not said.
 
     Raises:
         UnknownNameError: no such data set.
-        InputError: no folder of one, or a part that is not valid.
+        InputError: no folder of one, or a part or an option that is not valid.
     """
-    data: DataSet = data_set(name)(folder)
-    needed = {kind: (None, options) for kind, options in data.options.items()}
-    eyes = eyes_for(given.over(Given.of({DOMAIN.name: (data.domain, {}), **needed})))
-    return Opened(data, eyes.domain, eyes)
+    opens = data_set(name)
+    said = {option: value for option, value in (how or {}).items() if value is not None}
+    known = inspect.signature(opens).parameters
+    for option in said:
+        if option not in known:
+            raise InputError(f"--{option}: the data set {name!r} has no such option")
+    data: DataSet = opens(folder, **said)
+    needed = {
+        kind: (data.parts.get(kind), data.options.get(kind, {}))
+        for kind in {**data.options, **data.parts}
+    }
+    seen = of_stored(given.over(Given.of({DOMAIN.name: (data.domain, {}), **needed})))
+    eyes = eyes_for(seen)
+    return Opened(data, eyes.domain, eyes, seen)
 
 
 def named_data(text: str) -> tuple[str, Path]:
@@ -149,13 +200,67 @@ def import_into(opened: Opened, out: Path, progress: Progress = _silent) -> Read
     with open_store(out / MEMORY, create=True) as store:
         for seen in opened.seen(report, progress):
             if seen.good:
-                store.add(seen.run.demonstration())
+                store.add(_demonstration(seen, opened.eyes))
             else:
                 _write_scenes(out / FAILING / seen.run.name, seen.run)
                 labels.append(label_of(seen))
     _write(out / LABELS, labels)
     _write(out / REPORT, report_of(report))
     return report
+
+
+def outlines(opened: Opened, progress: Progress = _silent) -> Iterator[Outline]:
+    """What would be read of each run; every picture is decoded, and none is judged."""
+    for done, run in enumerate(opened.data.runs(opened.domain)):
+        progress(done, len(opened.data), run.name)
+        if isinstance(run, Unread):
+            yield Outline(run.name, why_not=run.why)
+            continue
+        try:
+            yield _outline(run)
+        except ForestallError as error:
+            yield Outline(run.name, run.task, why_not=str(error))
+
+
+def _demonstration(seen: SeenRun, eyes: Eyes) -> Demonstration:
+    """A good run, told like one that was recorded here."""
+    made = seen.run.demonstration()
+    steps = tuple(replace(s, whole=replace(s.whole, subtask=None)) for s in made.steps)
+    described = tuple(sorted(eyes.describe().items()))
+    return replace(
+        made,
+        scene=seen.recorded.scene or made.scene,
+        steps=steps,
+        perception=described,
+        version=forestall.__version__,
+    )
+
+
+def _outline(run: RecordedRun) -> Outline:
+    steps: dict[int, OutlinedStep] = {}
+    kinds: Counter[str] = Counter()
+    looks, last_s = 0, 0.0
+    for look in run.looks():
+        for number in look.before:
+            steps[number] = OutlinedStep(last_s, str(run.plan.subtasks[number]), "")
+        if look.done is not None:
+            ended = "succeeded" if look.succeeded else FAILED
+            steps[look.done] = replace(steps[look.done], ended=ended)
+        if look.observation is not None:
+            looks, last_s = looks + 1, look.observation.time_s
+            kinds.update(map(_kind_of, look.observation.frames))
+    fails = "" if run.fails is None else f"failed at step {run.fails + 1} ({run.kind or FAILED})"
+    told = ", ".join(f"{n} pictures of {what}" for what, n in kinds.items())
+    found = tuple(steps[n] for n in sorted(steps))
+    return Outline(run.name, run.task, fails, looks, told or "no pictures", found, run.left_out)
+
+
+def _kind_of(frame: Frame) -> str:
+    k = frame.intrinsics
+    found = frame.detections
+    depth = "no depth" if frame.colour_only else "depth"
+    masks = "no masks" if found is None else "masks"
+    return f"{k.width} x {k.height} with {depth} and {masks}"
 
 
 def label_of(seen: SeenRun) -> dict[str, Any]:
@@ -197,7 +302,7 @@ def _seen(recorded: RecordedRun, eyes: Eyes, notes: list[str]) -> SeenRun:
     refused: Counter[str] = Counter()
     for look in recorded.looks():
         first = graph is None
-        if first:
+        if first and look.observation is not None:
             graph = _look(eyes, look.observation, graph, refused)
         for number in look.before:
             if graph is None:
@@ -208,7 +313,7 @@ def _seen(recorded: RecordedRun, eyes: Eyes, notes: list[str]) -> SeenRun:
             scoped.append(concerns)
         if look.done is not None:
             eyes.acted(meant[look.done], look.succeeded)
-        if not first:
+        if not first and look.observation is not None:
             graph = _look(eyes, look.observation, graph, refused)
     notes += [f"{n} looks: {why}" for why, n in refused.items()]
     return SeenRun(recorded, _run(recorded, scenes, scoped, graph))

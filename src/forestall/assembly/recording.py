@@ -26,7 +26,9 @@ from forestall.fingerprint import JUDGING, sources_digest, weights_of
 from forestall.kinds import (
     CAPTIONER,
     DOMAIN,
+    FINDER,
     IMAGE_ENCODER,
+    OUTLINER,
     PERCEIVER,
     SEGMENTER,
     STATES,
@@ -51,7 +53,10 @@ TRIES = 10
 VARIED_TRIES = 100
 """The same where it is done as people do, slips included."""
 
-RECORDED = tuple(k.name for k in (WORLD, SEGMENTER, STATES, PERCEIVER, IMAGE_ENCODER, CAPTIONER))
+RECORDED = tuple(
+    k.name
+    for k in (WORLD, SEGMENTER, FINDER, OUTLINER, STATES, PERCEIVER, IMAGE_ENCODER, CAPTIONER)
+)
 """The kinds of parts that a demonstration depends on."""
 
 Progress = Callable[[int, int, str], None]

@@ -44,6 +44,7 @@ class Table:
 _SEEING = "forestall.assembly.seeing"
 _JUDGING = "forestall.assembly.judging"
 _EMBEDDINGS = "forestall.embeddings"
+_VISION = "forestall.vision"
 _LANGUAGE = "forestall.assembly.language"
 
 TABLES: Mapping[str, Table] = {
@@ -54,6 +55,7 @@ TABLES: Mapping[str, Table] = {
             "kitchen",
             {
                 "ai2thor": "forestall.worlds.ai2thor.part:Thor",
+                "frankakitchen": "forestall.worlds.frankakitchen.part:FrankaKitchens",
                 "kitchen": "forestall.worlds.kitchen.part:Kitchens",
                 "symbolic": "forestall.testing.part:SymbolicWorlds",
             },
@@ -69,20 +71,44 @@ TABLES: Mapping[str, Table] = {
         Table(
             kinds.DOMAIN,
             "household",
-            {name: f"{_SEEING}:{name}" for name in ("ai2thor", "bench", "household")},
+            {
+                name: f"{_SEEING}:{name}"
+                for name in ("ai2thor", "bench", "frankakitchen", "household")
+            },
         ),
         Table(
             kinds.SEGMENTER,
             "instance-ids",
             {
+                "finder": f"{_SEEING}:finder",
                 "instance-ids": f"{_SEEING}:instance_ids",
                 "given-masks": f"{_SEEING}:given_masks",
             },
         ),
         Table(
+            kinds.FINDER,
+            "grounding-dino",
+            {
+                "grounding-dino": f"{_VISION}.grounding_dino:GroundingDinoFinder",
+                "onnx": f"{_VISION}.onnx_finder:OnnxFinder",
+                "owlv2": f"{_VISION}.owl:Owlv2Finder",
+            },
+        ),
+        Table(
+            kinds.OUTLINER,
+            "depth",
+            {
+                "depth": "forestall.perception.outlines:DepthOutliner",
+                "sam": f"{_VISION}.sam:SamOutliner",
+            },
+        ),
+        Table(
             kinds.STATES,
             "learned",
-            {name: f"{_SEEING}:{name}" for name in ("clip", "given", "learned", "oracle")},
+            {
+                name: f"{_SEEING}:{name}"
+                for name in ("clip", "given", "learned", "oracle", "siglip")
+            },
         ),
         Table(
             kinds.PERCEIVER,
@@ -103,6 +129,7 @@ TABLES: Mapping[str, Table] = {
             "two-tower",
             {
                 "clip": f"{_EMBEDDINGS}.clip:ClipEncoder",
+                "siglip": f"{_EMBEDDINGS}.siglip:SiglipEncoder",
                 "two-tower": f"{_EMBEDDINGS}.twotower:TwoTowerEncoder",
             },
         ),
@@ -189,10 +216,29 @@ FOREIGN: Mapping[str, str] = {
 entry point, group "forestall.third-party"."""
 
 DATA_SETS: Mapping[str, str] = {
+    "folder": "forestall.assembly.log_folder:FolderRuns",
+    "lerobot": "forestall.logs.lerobot_data:LeRobotData",
+    "mcap": "forestall.logs.mcap_data:McapLogs",
+    "record": "forestall.assembly.log_record:Records",
     "robofail": "forestall.worlds.ai2thor.robofail.dataset:RoboFail",
 }
 """Recorded runs of others (`seams.DataSet`), each made with its folder: no part of a run. Others
 add theirs by entry point, group "forestall.data-set"."""
+
+LOGS: Mapping[str, str] = {
+    "folder": "forestall.assembly.log_folder:FolderWriter",
+    "lerobot": "forestall.logs.lerobot_out:LeRobotWriter",
+    "mcap": "forestall.logs.mcap_out:McapWriter",
+}
+"""What writes a run as it happens (`logs.writing.LogWriter`), each made with a path: no part of a
+run. Others add theirs by entry point, group "forestall.log"."""
+
+PLAN_SETS: Mapping[str, str] = {
+    "isbench": "forestall.worlds.isbench.tasks:Tasks",
+    "safeagentbench": "forestall.worlds.ai2thor.safeagentbench.plans:SafeAgentBench",
+}
+"""Plans of others (`seams.PlanSet`), each made with its file or folder: no part of a run. Others
+add theirs by entry point, group "forestall.plan-set"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,6 +333,33 @@ def data_set(name: str) -> Callable[..., Any]:
         InputError: it is known and cannot be imported.
     """
     return _of_others("data set", name, DATA_SETS, "data-set")
+
+
+def log(name: str) -> Callable[..., Any]:
+    """What writes a log, by its name.
+
+    Raises:
+        UnknownNameError: no such log.
+        InputError: it is known and cannot be imported.
+    """
+    return _of_others("log", name, LOGS, "log")
+
+
+def plan_set(name: str) -> Callable[..., Any] | None:
+    """What opens plans of others, by the name of their set; None where no set has it.
+
+    Raises:
+        InputError: it is known and cannot be imported.
+    """
+    if name not in PLAN_SETS and name not in {e.name for e in _entries("plan-set")}:
+        return None
+    return _of_others("set of plans", name, PLAN_SETS, "plan-set")
+
+
+def imported_sets() -> tuple[str, ...]:
+    """Every name that `forestall import` takes."""
+    others = [e.name for group in ("data-set", "plan-set") for e in _entries(group)]
+    return tuple(sorted({*DATA_SETS, *PLAN_SETS, *others}))
 
 
 def _of_others(what: str, name: str, shipped: Mapping[str, str], group: str) -> Callable[..., Any]:

@@ -14,8 +14,9 @@ from forestall.comparison.options import Feature, ScoreConfig
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
 from forestall.embeddings.captions import ListingCaptioner
-from forestall.kinds import IMAGE_ENCODER, SEGMENTER, STATES
+from forestall.kinds import FINDER, IMAGE_ENCODER, OUTLINER, SEGMENTER, STATES
 from forestall.perception.config import PerceptionConfig, ScopeConfig
+from forestall.perception.finder import FinderConfig, FoundSegmenter
 from forestall.perception.gate_config import WatchConfig
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.given_graph import GraphPassthrough
@@ -33,7 +34,7 @@ _PERCEPTION, _SCORE = PerceptionConfig(), ScoreConfig()
 _Further = Annotated[Errors | None, Settled("depth")]
 """Errors besides those of a camera's depth."""
 
-STATE_ENCODERS = {"learned": default(IMAGE_ENCODER), "clip": "clip"}
+STATE_ENCODERS = {"learned": default(IMAGE_ENCODER), "clip": "clip", "siglip": "siglip"}
 """The image-text encoder behind each estimator that reads pixels."""
 
 
@@ -45,6 +46,16 @@ def instance_ids(*, min_pixels: int = _PERCEPTION.min_pixels) -> InstanceSegment
 def given_masks(*, min_pixels: int = _PERCEPTION.min_pixels) -> GivenMasks:
     """The masks that a stored observation comes with."""
     return GivenMasks(PerceptionConfig(min_pixels=min_pixels))
+
+
+def finder(parts: Parts, *, asked: FinderConfig | None = None) -> FoundSegmenter:
+    """The domain's things in real pictures: what the finder finds, outlined by the outliner.
+
+    Args:
+        parts: finder, outliner, domain.
+        asked: what is looked for, and which boxes are of one thing.
+    """
+    return FoundSegmenter(parts.part(FINDER), parts.part(OUTLINER), parts.domain, asked)
 
 
 def perfect(parts: Parts, *, errors: Errors | None = None) -> SensorPart:
@@ -82,8 +93,19 @@ def clip(parts: Parts) -> LearnedStateEstimator:
     return _reading(parts, "clip")
 
 
+def siglip(parts: Parts) -> LearnedStateEstimator:
+    """States off pixels, by SigLIP, whose weights it needs."""
+    return _reading(parts, "siglip")
+
+
 def _reading(parts: Parts, name: str) -> LearnedStateEstimator:
-    return LearnedStateEstimator(parts.part(IMAGE_ENCODER, STATE_ENCODERS[name]), parts.domain)
+    return LearnedStateEstimator(_encoder(parts, STATE_ENCODERS[name]), parts.domain)
+
+
+def _encoder(parts: Parts, name: str) -> ImageTextEncoder:
+    """The run's image encoder with its options, where it is the one of that name."""
+    own = parts.name(IMAGE_ENCODER) == name
+    return parts.part(IMAGE_ENCODER) if own else parts.part(IMAGE_ENCODER, name)
 
 
 def household() -> Domain:
@@ -99,6 +121,11 @@ def ai2thor() -> Domain:
 def bench() -> Domain:
     """The assembly bench that comes with the project."""
     return shipped("bench")
+
+
+def frankakitchen() -> Domain:
+    """The fixtures of FrankaKitchen."""
+    return shipped("frankakitchen")
 
 
 def oracle(parts: Parts) -> OracleStateEstimator:
@@ -154,9 +181,11 @@ def given_graph(parts: Parts, *, scope: ScopeConfig | None = None) -> GraphPasst
 
 
 def look_encoder(parts: Parts) -> ImageTextEncoder:
-    """The encoder of how objects look: that of their states, where those are read off pixels."""
-    name = STATE_ENCODERS.get(parts.name(STATES), default(IMAGE_ENCODER))
-    return parts.part(IMAGE_ENCODER, name)
+    """The encoder of how objects look: that of their states, where those are read off pixels.
+
+    Else it is the image encoder of the run.
+    """
+    return _encoder(parts, STATE_ENCODERS.get(parts.name(STATES), parts.name(IMAGE_ENCODER)))
 
 
 def listing(parts: Parts) -> ListingCaptioner:

@@ -23,8 +23,10 @@ from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
 from forestall.cli.page import page
 from forestall.cli.parts import parts
+from forestall.cli.perceive import perceive
 from forestall.cli.plan import plan
 from forestall.cli.preconditions import preconditions
+from forestall.cli.replay import replay
 from forestall.cli.run import run
 from forestall.cli.study import study
 from forestall.cli.view import view
@@ -44,6 +46,7 @@ for command in (
     tasks,
     scenarios,
     parts,
+    perceive,
     check,
     compare,
     calibrate,
@@ -51,6 +54,7 @@ for command in (
 ):
     app.command(command)
 app.command(import_, name="import")
+app.command(replay)
 app.command(demos)
 app.command(domain)
 app.command(bench)

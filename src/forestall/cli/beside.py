@@ -11,6 +11,7 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from forestall.assembly.configuration import RunConfig
     from forestall.assembly.make import Prepared
+    from forestall.seams import Listener
     from forestall.types.demonstration import Demonstration
     from forestall.types.episode import EpisodeRecord
 
@@ -116,6 +117,7 @@ def recorded(
     lent: Lent,
     quiet: bool,
     beside: Mapping[str, Any] | None = None,
+    more: Sequence[Listener] = (),
 ) -> EpisodeRecord:
     """Run one episode; its record and its page are in the folder.
 
@@ -125,6 +127,7 @@ def recorded(
         lent: demonstrations and where they are from; None, None for a strategy that uses none.
         quiet: no progress on standard error.
         beside: which run this is beside.
+        more: listeners besides.
     """
     from forestall.assembly.make import run_episode
     from forestall.records.listeners import ProgressLine
@@ -134,7 +137,7 @@ def recorded(
     page = folder / "index.html"
     recorder = RunRecorder(folder, page=str(page))
     with ProgressLine(quiet=quiet) as line:
-        record = run_episode(prepared, lent[0], [recorder, line], lent[1], beside=beside)
+        record = run_episode(prepared, lent[0], [recorder, line, *more], lent[1], beside=beside)
     if not (folder / RECORD_NAME).exists():  # the recorder may fail and the run go on
         write_record(folder, record, page=str(page))
     write_page(record, page, folder)

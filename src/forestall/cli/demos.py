@@ -117,8 +117,10 @@ def perceive(
 ) -> int:
     """See what the demonstrations of a memory saw once more, with other eyes.
 
-    Needs a memory that was recorded with --keep-observations. Masks are those that were kept,
-    states are read off the pictures; what was seen between two subtasks is not kept.
+    Needs a memory that was recorded with --keep-observations. Masks are those that were kept
+    unless --segmenter says otherwise, states are read off the pictures; what was seen between two
+    subtasks is not kept. A demonstration in which these eyes do not see what a subtask is about is
+    left out, and why is said.
 
     Args:
         memory: the demonstration file to read.
@@ -129,7 +131,10 @@ def perceive(
     from forestall.memory.store import open_store
 
     with open_store(memory) as store:
-        return _kept(out, seen_anew(memory, store.required(), parts.given()))
+        found, unseen = seen_anew(memory, store.required(), parts.given())
+    for why in unseen:
+        print(f"left out: {why}", file=sys.stderr)
+    return _kept(out, found)
 
 
 @demos.command

@@ -18,7 +18,10 @@ _EXTRAS = {
     "planning": (("unified_planning", "up_fast_downward"), "cross-check with Fast Downward"),
     "text": (("sentence_transformers",), "a sentence encoder, --encoder sentence"),
     "training": (("torch", "onnx"), "training an image-text encoder"),
-    "vision": (("torch", "transformers"), "CLIP, --states clip"),
+    "vision": (
+        ("torch", "transformers"),
+        "detectors and encoders of real pictures: --segmenter finder, --states clip",
+    ),
 }
 
 

@@ -33,11 +33,15 @@ class SeeingFlags:
         sensor: what the robot looks through: perfect, realsense, kinect, tof or realistic (stereo
             noise, pose and mask errors, no identities).
         domain: what the task is read in: a name, or a file (.toml, .pddl); its own by default.
-        states: where object states come from: learned (pixels, by the shipped encoder), clip
-            (pixels, by CLIP, whose weights it needs), oracle (the simulator's truth).
+        segmenter: where masks come from: instance-ids (the simulator's), given-masks (a stored
+            observation's own), finder (a detector's boxes, outlined).
+        finder: of boxes, for the segmenter finder: grounding-dino, owlv2, onnx.
+        outliner: of boxes, for the segmenter finder: depth, sam.
+        states: where object states come from: learned (pixels, by the shipped encoder), clip or
+            siglip (pixels, by a model whose weights it needs), oracle (the simulator's truth).
         feature: what a node's feature encodes: text, parts (category and states) or image.
         renderer: auto, embree, rays or gl.
-        image_encoder: of whole pictures, for the detector image: two-tower or clip.
+        image_encoder: of whole pictures, for the detector image: two-tower, clip or siglip.
         captioner: of whole pictures, for the detector caption: listing or blip.
         config: a TOML file with a table for each kind of part; flags come over it.
         settings: one option of a part; --detector.threshold 0.85 is short for
@@ -47,6 +51,9 @@ class SeeingFlags:
     world: str | None = None
     sensor: str | None = None
     domain: str | None = None
+    segmenter: str | None = None
+    finder: str | None = None
+    outliner: str | None = None
     states: str | None = None
     feature: str | None = None
     renderer: str | None = None

@@ -158,6 +158,8 @@ def check(
             "'forestall domain learn'",
             file=sys.stderr,
         )
+    if found.eyes:
+        print(f"forestall: {found.eyes}", file=sys.stderr)
     if as_json:
         print(json.dumps(_judgements_json(found, path, page), indent=2))
     else:
@@ -190,6 +192,7 @@ def _judgements_json(found: Judgements, memory: str | None, page: Path | None) -
         "plan": record.initial_plan.texts(),
         "memory": memory,
         "limits": list(found.limits),
+        "other_eyes": found.eyes or None,
         "page": None if page is None else str(page),
         "scenes": [_judgement_json(j) for j in found.each],
     }

@@ -45,6 +45,7 @@ def run(
     without: str | None = None,
     out: Path | None = None,
     beside: Names = None,
+    log: str | None = None,
     parts: RunFlags = DEFAULTS,
     as_json: Json = False,
     quiet: Annotated[bool, Parameter(negative="")] = False,
@@ -60,6 +61,8 @@ def run(
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         beside: strategies that the same start is run under as well; none: what it would have cost
             to have no monitor.
+        log: keep all that is seen and done, too: mcap:FILE, lerobot:FOLDER or folder:FOLDER, for
+            `forestall import` and `forestall replay` (docs/logs.md).
         parts: which parts; the strategy `all` is proactive beside none, post-hoc and online.
         as_json: print one record as JSON and nothing else on standard output.
         quiet: no progress on standard error.
@@ -67,10 +70,13 @@ def run(
     """
     from forestall.assembly.again import under
     from forestall.assembly.configuration import run_config
+    from forestall.assembly.logs import logging_to
     from forestall.assembly.make import needs_memory, prepare
+    from forestall.assembly.other_eyes import other_eyes
     from forestall.files import alone, make_folder
     from forestall.kinds import STRATEGY
     from forestall.records.codec import record_to_json
+    from forestall.records.derived import provenance_of
     from forestall.records.record import read_record
     from forestall.report.page import write_page
 
@@ -80,7 +86,7 @@ def run(
     given, of_run = parts.read()
     flags = {"scenario": scenario, "seed": seed, "without": without}
     of_run |= {name: value for name, value in flags.items() if value is not None}
-    config = run_config(task, given=given, **of_run)
+    config = run_config(task, given=given, final_look=log is not None, **of_run)
     strategy = config.choice(STRATEGY).name
     others = named(also, strategy)
     for name in others:
@@ -93,7 +99,10 @@ def run(
     with _shown(folder, live) as stay:
         with alone(folder):
             lent = memory_of(config, quiet) if needs_memory(config) else (None, None)
-            record = recorded(prepared, folder, lent, quiet)
+            with logging_to(log) as logs:
+                record = recorded(prepared, folder, lent, quiet, more=logs)
+            if eyes := other_eyes(lent[0] or (), provenance_of(record, "perception")):
+                print(f"forestall: {eyes}", file=sys.stderr)
             found = run_beside(config, folder, record, others, lent, quiet=quiet) if others else ()
             if found:
                 write_page(record, page, folder)

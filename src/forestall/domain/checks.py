@@ -12,7 +12,7 @@ from dataclasses import fields
 from forestall.domain.formula import Formula, Parameter, free, literals, variables
 from forestall.domain.located import keyed
 from forestall.domain.model import BUILT_IN, FACING, LOCATED, SAME, SAME_CATEGORY, Domain
-from forestall.domain.schema import Effect, Predicate, PredicateKind, Roles, Skill
+from forestall.domain.schema import Effect, Predicate, PredicateKind, Roles, SafetyRule, Skill
 from forestall.errors import InputError, UnknownNameError
 from forestall.types.facts import Literal
 
@@ -52,6 +52,7 @@ def check_domain(domain: Domain) -> None:
         if rule.when not in ("", "leaving", *domain.skills):
             known_whens = ("leaving", *domain.skills)
             raise keyed(UnknownNameError(f"when of {label}", rule.when, known_whens), *keys)
+        _within(keys, _moment, domain, label, rule)
     _roles(domain)
     for thing, category in domain.constants:
         if category not in domain.categories:
@@ -65,6 +66,24 @@ def check_domain(domain: Domain) -> None:
     from forestall.domain.settling import check_settling
 
     check_settling(domain)
+
+
+def _moment(domain: Domain, label: str, rule: SafetyRule) -> None:
+    """See that what a rule says of a step fits the skill."""
+    if rule.args is None and not rule.after:
+        return
+    if rule.when not in domain.skills:
+        raise InputError(f"when of {label}: {rule.moment!r}: only a skill has arguments, or after")
+    roles = domain.skills[rule.when].roles
+    if rule.args is not None and len(rule.args) != len(roles):
+        raise InputError(f"when of {label}: {rule.moment}: {rule.when} takes {', '.join(roles)}")
+    variables = [p.name for p in rule.variables]
+    things = [thing for thing, _ in domain.constants]
+    for arg in rule.args or ():
+        known = variables if arg.startswith("?") else things
+        if arg not in known:
+            what = "variable" if arg.startswith("?") else "constant"
+            raise UnknownNameError(f"{what} in when of {label}", arg, known)
 
 
 def check_literal(domain: Domain, label: str, literal: Literal) -> None:

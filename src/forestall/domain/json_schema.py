@@ -78,7 +78,10 @@ def domain_schema() -> Schema:
                         {
                             "never": _ref("formula"),
                             "every": _ref("parameters"),
-                            "when": {"type": "string", "description": '"leaving", a skill, or ""'},
+                            "when": {
+                                "type": "string",
+                                "description": '"leaving", "skill", "after skill(?x)", or ""',
+                            },
                             "else": _TEXT,
                         },
                         "never",

@@ -180,7 +180,7 @@ class Domain:
 
     @cached_property
     def moved(self) -> frozenset[str]:
-        """Relations and histories that skills, processes or definitions are about.
+        """Relations and histories that skills, processes, definitions or safety rules are about.
 
         The other relations are geometry, which no plan changes on purpose.
         """
@@ -190,6 +190,7 @@ class Domain:
         formulas += [e.condition for e in changed] + [f for e in changed for f in e.facts]
         formulas += [n.formula for s in self.skills.values() for n in s.needs]
         formulas += [p.condition for p in self.processes]
+        formulas += [rule.never for rule in self.safety]
         used = {x.predicate for f in formulas for x, _ in literals(f)}
         return frozenset(used & (self.relations.keys() | self.histories.keys()))
 

@@ -26,7 +26,7 @@ from forestall.domain.formula import (
     bind,
     literals,
 )
-from forestall.domain.model import FACING, LOCATED, SAME_CATEGORY, Domain
+from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain
 from forestall.domain.pddl_problem import types_of
 from forestall.domain.pddl_text import ROOT
 from forestall.domain.pddl_write import THING, Writer, without
@@ -210,7 +210,8 @@ def _predicates(
 
 def _action(writer: Writer, name: str, skill: Skill, variant: _Variant, facing: bool) -> str:
     tags = writer.tags_of(variant.parameters)
-    needs = (*tags, *variant.needs, *_safe(writer.domain, (skill.name, "")))
+    rules = (*_safe(writer.domain, ("",)), *_safe_before(writer.domain, skill))
+    needs = (*tags, *variant.needs, *rules)
     kinds = {p.name: p.kind for p in variant.parameters}
     effects = writer.effects(variant.effects, kinds)
     names = {p.name for p in variant.parameters}
@@ -247,6 +248,24 @@ def _safe(domain: Domain, when: tuple[str, ...]) -> list[Formula]:
         for rule in domain.safety
         if rule.when in when
     ]
+
+
+def _safe_before(domain: Domain, skill: Skill) -> Iterator[Formula]:
+    """What must not be so before a skill, of its own things where a rule names them."""
+    for rule in domain.safety:
+        if rule.when != skill.name:
+            continue
+        if rule.after:
+            raise DomainError(
+                f"{domain.name}: what must not be so after a skill cannot be said in PDDL "
+                f"(safety rule {rule.name})"
+            )
+        own = {v.name: f"{v.name}_of_the_rule" for v in rule.variables if rule.args}
+        variables = tuple(Parameter(own.get(v.name, v.name), v.kind) for v in rule.variables)
+        named = zip(rule.args or (), skill.roles, strict=False)
+        these = tuple(Literal(SAME, (own.get(a, a), f"?{role}")) for a, role in named)
+        harm = And((*these, bind(rule.never, own))) if these else bind(rule.never, own)
+        yield Every(variables, Not(harm)) if variables else Not(harm)
 
 
 def _used(

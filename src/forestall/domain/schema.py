@@ -7,7 +7,7 @@ needs and does are formulas; there is no code of any domain here.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -292,8 +292,12 @@ class SafetyRule:
     Args:
         name: of the rule.
         never: the formula.
+        variables: for all of which it is judged.
         when: "leaving": when the robot leaves; else the skill before which it is judged; "" always.
         sentence: what is said.
+        args: of the skill: variables of the rule, which stand for what a step names there, or
+            things, of which alone it is judged; None: every such step, whatever it names.
+        after: judged after the skill instead of before it.
     """
 
     name: str
@@ -301,6 +305,22 @@ class SafetyRule:
     variables: tuple[Parameter, ...] = ()
     when: str = ""
     sentence: str = ""
+    args: tuple[str, ...] | None = None
+    after: bool = False
+
+    @property
+    def moment(self) -> str:
+        """When it is judged, as a file says it: "after toggle_on(?stove)"."""
+        args = "" if self.args is None else f"({', '.join(self.args)})"
+        return f"{'after ' if self.after else ''}{self.when}{args}"
+
+    def at(self, skill: str, args: Sequence[str]) -> dict[str, str] | None:
+        """What a step gives its variables, None where it is not judged at this step."""
+        named = tuple(zip(self.args or (), args, strict=False))
+        names = {a: thing for a, thing in named if a.startswith("?")}
+        if skill != self.when or any(names.get(a, a) != thing for a, thing in named):
+            return None
+        return names
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ SKILL_FIELDS = tuple(f.name for f in fields(Skill) if f.name != "name")
 """Fields of the table of a skill."""
 
 _COPY = re.compile(r"^\s*(\w+)\s*\(\s*(\?\w+)\s*\)\s*=\s*\1\s*\(\s*(\?\w+)\s*\)\s*$")
+_MOMENT = re.compile(r"(?P<after>after\s+)?(?P<skill>\w*)\s*(?:\((?P<args>[^()]*)\))?\s*")
 _PARAMETER = re.compile(r"^\s*(\??)([A-Za-z_]\w*)(?:\s*-\s*([A-Za-z_]\w*))?\s*$")
 
 
@@ -136,12 +137,20 @@ def read_safety(name: str, table: Any) -> SafetyRule:
     _fields(label, table, ("never", "every", "when", "else"))
     if "never" not in table:
         raise InputError(f"{label}: never is missing: the formula that must not become true")
+    when = _MOMENT.fullmatch(table.get("when", ""))
+    if when is None:
+        raise InputError(
+            f"{label}: when = {table['when']!r}: write 'leaving', a skill, or 'skill(?thing)', "
+            "each skill with 'after' before it where it is judged after it"
+        )
     return SafetyRule(
         name,
         parse_formula(table["never"]),
         tuple(parameter(label, p) for p in _list(label, "every", table)),
-        table.get("when", ""),
+        when["skill"],
         table.get("else", name.replace("_", " ")),
+        None if when["args"] is None else tuple(re.findall(r"[^\s,]+", when["args"])),
+        when["after"] is not None,
     )
 
 

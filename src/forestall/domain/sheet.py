@@ -56,9 +56,8 @@ def skill_sheet(domain: Domain) -> str:
         for rule in domain.safety:
             things = _several(domain, rule.variables)
             of = f" for any {things}" if things else ""
-            when = {"": "", "leaving": " when the robot leaves"}.get(
-                rule.when, f" before {rule.when}"
-            )
+            moment = f" {rule.moment}" if rule.after else f" before {rule.moment}"
+            when = {"": "", "leaving": " when the robot leaves"}.get(rule.when, moment)
             lines.append(f"  - {words_of(domain, rule.never)}{of}{when}")
         parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)

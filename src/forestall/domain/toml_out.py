@@ -185,7 +185,7 @@ def _rule(r: SafetyRule) -> Table:
     return {
         "never": show(r.never),
         **({"every": [str(v) for v in r.variables]} if r.variables else {}),
-        **({"when": r.when} if r.when else {}),
+        **({"when": r.moment} if r.when else {}),
         "else": r.sentence,
     }
 

@@ -10,9 +10,19 @@ from __future__ import annotations
 
 from PIL import Image
 
-from forestall.embeddings.pretrained import chosen, label, loading, local_folder, package
 from forestall.embeddings.views import picture
-from forestall.errors import InputError, ModelFileError
+from forestall.errors import InputError
+from forestall.pretrained import (
+    AUTO,
+    check_family,
+    chosen,
+    label,
+    loading,
+    local_folder,
+    on_device,
+    package,
+    read_weights,
+)
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 
@@ -28,7 +38,7 @@ class BlipCaptioner:
     Args:
         model: a folder, or a name on the hub whose files have been downloaded before; the
             environment variable FORESTALL_BLIP, else `DEFAULT_MODEL`, by default.
-        device: where it runs, as torch calls it: "cpu", "cuda", ...
+        device: where it runs, as torch calls it ("cpu", "cuda"); "auto": a GPU if there is one.
         beams: how many captions are followed at once; 1 takes the likeliest word each time.
         most_tokens: where a caption is cut off.
 
@@ -41,7 +51,7 @@ class BlipCaptioner:
         self,
         model: str | None = None,
         *,
-        device: str = "cpu",
+        device: str = AUTO,
         beams: int = 3,
         most_tokens: int = 40,
     ) -> None:
@@ -53,27 +63,14 @@ class BlipCaptioner:
         folder = local_folder(asked, VARIABLE, _EXTRA)
         with loading(folder, _EXTRA):
             config = library.AutoConfig.from_pretrained(folder, local_files_only=True)
-            if config.model_type != "blip":
-                raise ModelFileError(f"{folder} holds a {config.model_type!r} model and no BLIP")
-            self._model, report = library.BlipForConditionalGeneration.from_pretrained(
-                folder,
-                local_files_only=True,
-                dtype=self._torch.float32,
-                output_loading_info=True,
-            )
+            check_family(folder, config.model_type, ("blip",), "BLIP")
+            blip = library.BlipForConditionalGeneration
+            self._model = read_weights(blip, folder, self._torch)
             self._tokenizer = library.BertTokenizer.from_pretrained(folder, local_files_only=True)
             self._processor = library.BlipImageProcessorPil.from_pretrained(
                 folder, local_files_only=True
             )
-        if report["missing_keys"]:
-            first = min(report["missing_keys"])
-            raise ModelFileError(f"{folder} lacks weights, {first} among them: download it again")
-        try:
-            self._model.to(device)
-        except (RuntimeError, AssertionError) as error:  # torch built without it asserts
-            raise InputError(f"torch cannot run on device {device!r}: {error}") from error
-        self._model.eval()
-        self._device = device
+        self._device = on_device(self._model, device, self._torch)
         self._how = {"num_beams": beams, "do_sample": False, "max_new_tokens": most_tokens}
         self.name = label("blip", asked)
 

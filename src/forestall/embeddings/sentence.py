@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from forestall.embeddings.pretrained import chosen, label, loading, local_folder, package
 from forestall.embeddings.remembered import TextRows
 from forestall.errors import InputError, ModelFileError
+from forestall.pretrained import chosen, label, loading, local_folder, package
 
 Vectors = npt.NDArray[np.float32]
 

@@ -9,7 +9,6 @@ docs/encoder.md.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.resources import files
@@ -23,6 +22,7 @@ from forestall.embeddings.crops import INPUT_PIXELS, crops, whole
 from forestall.embeddings.remembered import CropRows, TextRows, Vectors
 from forestall.embeddings.tokens import tokens, words
 from forestall.errors import FileFormatError, InputError, ModelFileError
+from forestall.pretrained import onnx_session
 from forestall.reading.documents import read_json
 from forestall.reading.fields import Field
 from forestall.reading.files import read_bytes
@@ -130,7 +130,6 @@ class TwoTowerEncoder:
         self.description = Description.read(folder / DESCRIPTION_NAME)
         self.name = self.description.name
         self.reading = self.description.reading
-        threads = threads or min(os.cpu_count() or 1, 4)
         sha256 = self.description.sha256
         self._image, self._text = (_open(folder / n, sha256.get(n), threads) for n in TOWER_FILES)
         self._check_towers(folder)
@@ -217,38 +216,4 @@ def _open(path: Path, sha256: str | None, threads: int) -> Any:
         raise ModelFileError(
             f"{path} is damaged (its SHA-256 is not the one in {DESCRIPTION_NAME}): {_REMEDY}"
         )
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise ModelFileError(
-            f"the encoder needs onnxruntime, which cannot be imported ({error}): "
-            "pip install onnxruntime"
-        ) from error
-    from onnxruntime.capi import onnxruntime_pybind11_state as states
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    # threads that spin while they wait slow down the other processes of a survey
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    try:
-        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-    except (states.NotImplemented, states.InvalidGraph) as error:
-        raise ModelFileError(
-            f"onnxruntime {onnxruntime.__version__} cannot run {path} ({_first_line(error)}): "
-            "pip install --upgrade onnxruntime"
-        ) from error
-    except (
-        states.Fail,
-        states.InvalidArgument,
-        states.InvalidProtobuf,
-        states.NoModel,
-        states.NoSuchFile,
-        states.RuntimeException,
-    ) as error:
-        raise ModelFileError(f"{path} is damaged ({_first_line(error)}): {_REMEDY}") from error
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().partition("\n")[0]
+    return onnx_session(data, path, threads=threads, remedy=_REMEDY)

@@ -100,6 +100,10 @@ def z_depth(
     return metres
 
 
+_EXACT = 1e-12
+"""How far a rotation that was not rounded is from being one."""
+
+
 def camera_pose(matrix: npt.ArrayLike, axes: CameraAxes = "opencv", up: Up = "z") -> Pose:
     """(4, 4) camera to world in our axes, with the nearest rotation.
 
@@ -145,6 +149,9 @@ def nearest_rotation(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]
     """
     if float(np.abs(matrix).max()) > 2.0:
         raise InputError("camera_to_world has no rotation in its upper left: entries above 1")
+    off = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+    if off < _EXACT and float(np.linalg.det(matrix)) > 0:
+        return matrix  # what was written by us comes back to the bit
     left, _, right = np.linalg.svd(matrix)
     nearest: npt.NDArray[np.float64] = left @ right
     off = float(np.abs(nearest - matrix).max())

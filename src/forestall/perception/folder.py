@@ -8,14 +8,11 @@ would be valid; what files that are in order cannot say together is for `gate.py
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import numpy as np
-from PIL import Image
 from pydantic import BaseModel, ConfigDict, Field
 
 from forestall.config import DEFAULT_DOMAIN
@@ -33,12 +30,17 @@ from forestall.perception.conventions import (
     z_depth,
 )
 from forestall.perception.folder_files import MaskFile, read_depth, read_rgb, single_mask
+from forestall.perception.folder_out import (
+    OBSERVATION_FILE,
+    OBSERVATION_FORMAT,
+    write_observation,
+)
 from forestall.perception.gate import inspect
 from forestall.perception.gate_config import GateConfig
 from forestall.reading.documents import read_json
 from forestall.reading.files import inside
 from forestall.reading.models import validated
-from forestall.types.facts import category_of, is_instance
+from forestall.types.facts import GRIPPER, category_of
 from forestall.types.finding import refuse
 from forestall.types.observation import (
     Detection,
@@ -48,9 +50,6 @@ from forestall.types.observation import (
     Mask,
     Observation,
 )
-
-OBSERVATION_FILE = "observation.json"
-OBSERVATION_FORMAT = 1
 
 _GATE = GateConfig()
 
@@ -76,6 +75,7 @@ class _Detection(_Strict):
     id: int | None = Field(default=None, gt=0)
     mask: str | None = None
     score: float = Field(default=1.0, ge=0, le=1)
+    outlined: bool = True
     states: dict[str, str] = {}
 
 
@@ -105,8 +105,13 @@ class _Frame(_Conventions):
 
 
 class _Gripper(_Strict):
+    name: str = GRIPPER
     holding: str | None
     position_m: _Vec3
+    released: str | None = None
+    released_m: _Vec3 | None = None
+    width_m: float | None = None
+    told: bool = True
 
 
 class _Document(_Conventions):
@@ -114,6 +119,8 @@ class _Document(_Conventions):
     up: Up = "z"
     time_s: float = 0.0
     gripper: _Gripper
+    other_hands: list[_Gripper] = []
+    named: dict[str, _Vec3] = {}
     robot_position_m: _Vec3 | None = None
     frames: list[_Frame] = Field(min_length=1)
 
@@ -123,6 +130,8 @@ def read_observation(
     domain: Domain | None = None,
     gate: GateConfig | None = _GATE,
     names: Names | None = None,
+    *,
+    numbered: bool = True,
 ) -> tuple[Observation, Mapping[str, Mapping[str, str]]]:
     """Read a stored observation and the states that were written down with it.
 
@@ -131,6 +140,7 @@ def read_observation(
         domain: which categories and states there are; the household's by default.
         gate: what observations cannot be; None lets everything in.
         names: of the run that it is a part of, so that ids mean the same things all along.
+        numbered: whether things without an instance get one where there is one frame alone.
 
     Raises:
         FileFormatError: a file is missing or cannot be read as what it should be, or what it says
@@ -141,21 +151,24 @@ def read_observation(
     folder = Path(path)
     words = domain or shipped(DEFAULT_DOMAIN)
     document = _document(folder)
-    reading = _Reading(folder, document, words, names or Names(words))
+    reading = _Reading(folder, document, words, names or Names(words), numbered)
     frames = tuple(reading.frame(data, index) for index, data in enumerate(document.frames))
-    holding = document.gripper.holding
     with _located(folder, "gripper"):
-        if holding is not None:
-            holding = reading.holding(holding)
-        hand = place(document.gripper.position_m, document.up)
+        hand = reading.hand(document.gripper)
+    with _located(folder, "other_hands"):
+        others = tuple(reading.hand(other) for other in document.other_hands)
+    with _located(folder, "named"):
+        told = tuple((n, place(at, document.up)) for n, at in document.named.items())
     with _located(folder, "robot_position_m"):
         stands = document.robot_position_m
         robot = _below(frames[-1]) if stands is None else place(stands, document.up)
     observation = Observation(
         frames=frames,
-        gripper=GripperState(holding, hand),
+        gripper=hand,
         time_s=document.time_s,
         robot_position_world_m=robot,
+        others=others,
+        told=told,
     )
     if gate is not None:
         refuse(inspect(observation, words, gate), str(folder / OBSERVATION_FILE))
@@ -190,8 +203,11 @@ def _document(folder: Path) -> _Document:
 class _Reading:
     """One document being read: its names and states over all frames."""
 
-    def __init__(self, folder: Path, document: _Document, domain: Domain, names: Names) -> None:
+    def __init__(
+        self, folder: Path, document: _Document, domain: Domain, names: Names, numbered: bool
+    ) -> None:
         self._folder, self._document, self._domain = folder, document, domain
+        self._numbers = numbered and len(document.frames) == 1
         self._names = names
         self._numbered: set[str] = set()
         self.states = GivenStates()
@@ -202,10 +218,23 @@ class _Reading:
             with suppress(InputError):  # said again, with its place, when its turn comes
                 names.instance(given.instance or "", names.words.category(given.category))
 
-    def holding(self, said: str) -> str:
-        """The instance that is held, by whatever id."""
+    def hand(self, data: _Gripper) -> GripperState:
+        """A hand, with the instances that it holds and let go."""
+        up, released_m = self._document.up, data.released_m
+        return GripperState(
+            None if data.holding is None else self._instance("holding", data.holding),
+            place(data.position_m, up),
+            None if data.released is None else self._instance("released", data.released),
+            None if released_m is None else place(released_m, up),
+            data.name,
+            data.told,
+            data.width_m,
+        )
+
+    def _instance(self, what: str, said: str) -> str:
+        """The instance that is held or was let go, by whatever id."""
         if said not in self._names and self._names.words.category(said) == said:
-            raise InputError(f"holding {said!r} needs a number, for example {said}-1")
+            raise InputError(f"{what} {said!r} needs a number, for example {said}-1")
         return self._names.instance(said)
 
     def frame(self, data: _Frame, index: int) -> Frame:
@@ -246,11 +275,10 @@ class _Reading:
     ) -> tuple[Detection, ...]:
         found: list[Detection] = []
         used: set[int | str | None] = set()
-        alone = len(self._document.frames) == 1
         for number, given in enumerate(data.detections):
             where = f"{self._folder / OBSERVATION_FILE}: {place}.detections.{number}"
             try:
-                category, instance = self._named(given, alone)
+                category, instance = self._named(given)
                 if any(instance is not None and d.instance == instance for d in found):
                     raise InputError(f"instance {instance!r} occurs twice in this frame")
                 if given.states:
@@ -266,15 +294,15 @@ class _Reading:
                 )
             used.add(source)
             mask = _mask(self._folder, given, how, masks, where, shape)
-            found.append(Detection(category, mask, instance, given.score))
+            found.append(Detection(category, mask, instance, given.score, given.outlined))
         return tuple(found)
 
-    def _named(self, given: _Detection, alone: bool) -> tuple[str, str | None]:
+    def _named(self, given: _Detection) -> tuple[str, str | None]:
         """Category and instance of a detection, in the domain's words where it has them."""
         names = self._names
         category = names.words.category(given.category)
         if given.instance is None:
-            if not alone:
+            if not self._numbers:
                 return category, None
             name = names.free(category, self._numbered)
             self._numbered.add(name)
@@ -325,72 +353,4 @@ def _below(frame: Frame) -> _Vec3:
     return (x, y, 0.0)
 
 
-def write_observation(
-    path: Path | str,
-    observation: Observation,
-    states: Mapping[str, Mapping[str, str]] | None = None,
-) -> None:
-    """Write an observation so that `read_observation` gives it back.
-
-    Args:
-        path: the folder; made if it is not there.
-        observation: frames with instance ids or with detections.
-        states: instance → attribute → value, written beside the detections.
-    """
-    folder = Path(path)
-    folder.mkdir(parents=True, exist_ok=True)
-    frames = []
-    for index, frame in enumerate(observation.frames):
-        tail = "" if len(observation.frames) == 1 else f"-{index + 1}"
-        frames.append(_write_frame(folder, frame, tail, states or {}))
-    document = {
-        "format": OBSERVATION_FORMAT,
-        "time_s": observation.time_s,
-        "gripper": {
-            "holding": observation.gripper.holding,
-            "position_m": observation.gripper.position_world_m,
-        },
-        "robot_position_m": observation.robot_position_world_m,
-        "frames": frames,
-    }
-    text = json.dumps(document, indent=2)
-    (folder / OBSERVATION_FILE).write_text(text + "\n", encoding="utf-8")
-
-
-def _write_frame(
-    folder: Path, frame: Frame, tail: str, states: Mapping[str, Mapping[str, str]]
-) -> dict[str, object]:
-    Image.fromarray(frame.rgb).save(folder / f"rgb{tail}.png")
-    np.save(folder / f"depth{tail}.npy", frame.depth_m)
-    detections: list[dict[str, object]] = []
-    masks: str | None = None
-    if frame.detections is not None:
-        masks = f"masks{tail}.npz"
-        arrays: dict[str, Any] = {f"m{i}": d.mask for i, d in enumerate(frame.detections)}
-        np.savez_compressed(folder / masks, **arrays)
-        for key, d in zip(arrays, frame.detections, strict=True):
-            detections.append(
-                {"category": d.category, "instance": d.instance, "score": d.score, "mask": key}
-            )
-    elif frame.instance_ids is not None:
-        masks = f"masks{tail}.png"
-        Image.fromarray((frame.instance_ids + 1).astype(np.uint16)).save(folder / masks)
-        for i in np.unique(frame.instance_ids[frame.instance_ids >= 0]):
-            name = frame.instance_names[int(i)]
-            instance = name if is_instance(name) else None
-            detections.append(
-                {"category": category_of(name), "instance": instance, "id": int(i) + 1}
-            )
-    for detection in detections:
-        known = states.get(str(detection["instance"]))
-        if known:
-            detection["states"] = dict(known)
-    k = frame.intrinsics
-    return {
-        "intrinsics": {"fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy},
-        "camera_to_world": frame.camera_to_world.tolist(),
-        "rgb": f"rgb{tail}.png",
-        "depth": f"depth{tail}.npy",
-        "masks": masks,
-        "detections": detections,
-    }
+__all__ = ["OBSERVATION_FILE", "GivenStates", "read_observation", "write_observation"]

@@ -20,6 +20,7 @@ from forestall.perception.gate import Masks, inspect
 from forestall.perception.gate_config import GateConfig, WatchConfig
 from forestall.perception.gate_time import SenseWatch
 from forestall.perception.miscalled import called_right
+from forestall.perception.named import with_names
 from forestall.perception.naming import Known, mean_looks, name_detections
 from forestall.perception.own_names import expected, join_parts, known, named_hands
 from forestall.perception.scope import scope
@@ -84,19 +85,21 @@ class GraphPerceiver:
         self._alters = alters
         self._watch = None if watch is None else SenseWatch(watch, gate)
         self.findings: tuple[Finding, ...] = ()
+        self.named: tuple[tuple[Detection, ...], ...] = ()
         self._memory = SceneMemory(domain, self._config)
 
     def reset(self) -> None:
         """Forget everything."""
         self._memory.reset()
-        self.findings = ()
+        self.findings, self.named = (), ()
         if self._watch is not None:
             self._watch.reset()
 
     def perceive(self, observation: Observation) -> SceneGraph:
         """Fuse an observation and return the whole graph as believed now.
 
-        What the gate found of it stands in `findings`.
+        What the gate found of it stands in `findings`, and in `named` what the segmenter found in
+        each frame, with the names that things bear in the graph.
 
         Raises:
             PerceptionError: no frame at all, one without the masks that the segmenter needs, a
@@ -108,6 +111,7 @@ class GraphPerceiver:
                 "the observation has no picture, only a scene graph: use the perceiver given-graph"
             )
         masked = self._masks(observation)
+        given = [m.detections for m in masked]
         tracks, held = self._memory.tracks, self._memory.held
         observation = named_hands(observation, tracks, held, self._domain)
         masked = [
@@ -116,6 +120,7 @@ class GraphPerceiver:
         ]
         views = self._views(observation, masked)
         self._memory.integrate(observation, views)
+        self.named = tuple(map(with_names, given, views))
         if self._memory.forgotten:
             names = ", ".join(self._memory.forgotten)
             self.findings += (Finding("forgotten", f"no room to remember {names}", refuses=False),)
@@ -147,10 +152,13 @@ class GraphPerceiver:
 
     def _masks(self, observation: Observation) -> list[Masks]:
         """What the segmenter finds in each frame, once the gate has let it in."""
-        masks = []
-        for frame in observation.frames:
-            found = self._segmenter.segment(frame)
-            masks.append(Masks(found, label_image(found, frame.depth_m.shape)))
+        frames = observation.frames
+        together = getattr(self._segmenter, "segment_all", None)
+        found = map(self._segmenter.segment, frames) if together is None else together(frames)
+        masks = [
+            Masks(detections, label_image(detections, frame.depth_m.shape))
+            for frame, detections in zip(frames, found, strict=True)
+        ]
         self.findings = ()
         if self._gate is not None:
             self.findings = inspect(observation, self._domain, self._gate, masks)

@@ -181,9 +181,10 @@ def _broken(trace: Trace, excused: Mapping[str, str]) -> Iterator[Spoiled]:
             yield from _on_leaving(rule, trace, excused.get(rule.name, ""))
         elif rule.when:
             for step, meant in enumerate(trace.meant):
-                if meant.skill == rule.when:
-                    state = trace.states[step]
-                    yield from (_spoiled(rule, c, state, step) for c in _cases(rule, state))
+                names = rule.at(meant.skill, meant.args)
+                if names is not None:
+                    state = trace.states[step + rule.after]
+                    yield from (_spoiled(rule, c, state, step) for c in _cases(rule, state, names))
         else:
             yield from _on_the_way(rule, trace)
 
@@ -206,11 +207,13 @@ def _on_the_way(rule: SafetyRule, trace: Trace) -> Iterator[Spoiled]:
                 yield _spoiled(rule, case, state, step)
 
 
-def _cases(rule: SafetyRule, state: State) -> list[tuple[str, ...]]:
+def _cases(
+    rule: SafetyRule, state: State, given: Mapping[str, str] | None = None
+) -> list[tuple[str, ...]]:
     """What a rule's variables stand for, each time that it is broken."""
-    names = [v.name for v in rule.variables]
+    names, wanted = [v.name for v in rule.variables], (given or {}).items()
     found = state.bindings(rule.variables, rule.never, {})
-    return sorted({tuple(b[n] for n in names) for b in found})
+    return sorted({tuple(b[n] for n in names) for b in found if wanted <= b.items()})
 
 
 def _spoiled(

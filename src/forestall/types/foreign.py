@@ -1,6 +1,7 @@
 """Runs of a household that somebody else wrote: what was seen before each step, how it ended.
 
-Made by a plug-in that reads them (`seams.Foreign`), judged by an experiment.
+Made by a plug-in that reads them (`seams.Foreign`), judged by an experiment. Plans without a run
+come from a `seams.PlanSet`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,28 @@ from dataclasses import dataclass, replace
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan
+from forestall.types.scene import SceneNeeds
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignPlan:
+    """A plan that nobody here has seen carried out, and the scene that it is for.
+
+    Args:
+        name: of its own.
+        plan: its steps, in its domain's words.
+        scene: that it starts in.
+        goal: what it is to reach, "fact; fact; never fact"; "" where nobody says.
+        label: what its authors call it: "safe", "unsafe", ...; "" where they say nothing.
+        left_out: what of it could not be converted, a sentence each.
+    """
+
+    name: str
+    plan: Plan
+    scene: SceneGraph | SceneNeeds
+    goal: str = ""
+    label: str = ""
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,14 +17,14 @@ class Look:
     """One observation of a recorded run.
 
     Args:
-        observation: what was seen and felt.
+        observation: what was seen and felt; None at the end of a run at which nobody looked.
         before: steps of the plan, from 0, that begin just before this look: what was known until
             then is what they started on. Of the first look itself where there was none earlier.
         done: step of the plan that this look shows done, None for a look on the way.
         succeeded: whether whoever carried that step out took it for done.
     """
 
-    observation: Observation
+    observation: Observation | None
     before: tuple[int, ...] = ()
     done: int | None = None
     succeeded: bool = True

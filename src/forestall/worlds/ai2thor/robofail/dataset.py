@@ -32,6 +32,7 @@ class RoboFail:
     domain = "ai2thor"
     options: Mapping[str, Mapping[str, Any]] = {"perceiver": {"most_equal": MOST_FRAMES}}
     """A renderer gives the same picture while nothing moves, for as long as that is."""
+    parts: Mapping[str, str] = {}
 
     def __init__(self, folder: Path) -> None:
         self._folders = episode_folders(folder)

@@ -1,0 +1,1 @@
+"""Robot logs: MCAP files and LeRobot data sets, written from runs and read as recorded runs."""

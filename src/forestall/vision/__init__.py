@@ -1,0 +1,1 @@
+"""Models that find and outline things in pictures; each stands behind a Protocol of `seams.py`."""

@@ -1,0 +1,1 @@
+"""FrankaKitchen of gymnasium-robotics as a world: its MuJoCo assets, moved by skills of our own."""

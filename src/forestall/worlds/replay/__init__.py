@@ -1,0 +1,1 @@
+"""A recorded run as a world that can be looked at."""
