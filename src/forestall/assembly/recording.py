@@ -237,6 +237,8 @@ def _recorded_now(
             if key not in store.recorded():
                 yield key, record_one(wanted[key])
         return
+    for job in {wanted[key].task: wanted[key] for key in left}.values():
+        prepare(job.config(job.first_seed))  # what cannot be run at all is said here, at once
     running: dict[Future[Demonstration], str] = {}
     with pool(min(workers, len(left))) as hands:
         try:

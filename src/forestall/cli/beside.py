@@ -40,7 +40,8 @@ def beside(
 
     Args:
         run: the folder of a run (see docs/record-format.md).
-        strategy: one or several; none by default, `all` for the paper's four.
+        strategy: one or several of none (the default), retry-once, proactive, plan-check, online,
+            online-scene, post-hoc and watch; all is the paper's four.
         quiet: no progress on standard error.
     """
     from forestall.assembly.again import config_of

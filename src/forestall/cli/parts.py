@@ -14,8 +14,8 @@ def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
     """List the parts of a run by kind, or one kind's with every option and its default.
 
     Args:
-        kind: only this kind, with options: world, sensor, domain, segmenter, states, perceiver,
-            text-encoder, image-encoder, captioner, store, retriever, detector, expectations, llm,
+        kind: only this kind, with options: world, sensor, domain, segmenter, finder, outliner,
+            states, perceiver, text-encoder, image-encoder, captioner, store, retriever, detector, expectations, llm,
             reasoner, replanner, validator, limit, strategy.
         as_json: print JSON, always with options.
     """
