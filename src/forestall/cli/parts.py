@@ -15,8 +15,8 @@ def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
 
     Args:
         kind: only this kind, with options: world, sensor, domain, segmenter, finder, outliner,
-            states, perceiver, text-encoder, image-encoder, captioner, store, retriever, detector, expectations, llm,
-            reasoner, replanner, validator, limit, strategy.
+            states, perceiver, text-encoder, image-encoder, captioner, store, retriever, detector,
+            expectations, llm, reasoner, replanner, validator, limit, strategy.
         as_json: print JSON, always with options.
     """
     from forestall.assembly.registry import TABLES, known, lacking, table
