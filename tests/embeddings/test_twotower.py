@@ -157,5 +157,5 @@ def test_without_onnxruntime_there_is_a_clear_error(monkeypatch: pytest.MonkeyPa
     import sys
 
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
-    with pytest.raises(ModelFileError, match="pip install onnxruntime"):
+    with pytest.raises(ModelFileError, match=r"forestall\[perception\]"):
         TwoTowerEncoder()

@@ -57,7 +57,7 @@ def test_a_thing_is_put_elsewhere_right_after_a_step_and_once(make: Callable[[],
     assert before.parents("Apple-1", DOMAIN.containing) == ("DiningTable-1",)
     after = _played(make, ("pick_up(Mug)",), **table)
     assert after.parents("Apple-1", DOMAIN.containing) == ("Fridge-1",)
-    assert after.holding == "Mug-1"
+    assert after.in_hands(("gripper",)) == ("Mug-1",)
 
 
 @pytest.mark.parametrize("make", WORLDS)
@@ -77,9 +77,11 @@ def test_what_runs_works_on_what_somebody_put_there(make: Callable[[], Any]) -> 
 
 @pytest.mark.parametrize("make", WORLDS)
 def test_a_hand_is_given_something_if_it_is_empty(make: Callable[[], Any]) -> None:
-    assert _played(make, (), object="Apple-1", place="gripper").holding == "Apple-1"
+    assert _played(make, (), object="Apple-1", place="gripper").in_hands(("gripper",)) == (
+        "Apple-1",
+    )
     table = {"step": "pick_up(Mug)", "object": "Apple-1", "place": "gripper"}
-    assert _played(make, ("pick_up(Mug)",), **table).holding == "Mug-1"
+    assert _played(make, ("pick_up(Mug)",), **table).in_hands(("gripper",)) == ("Mug-1",)
 
 
 @pytest.mark.parametrize("make", WORLDS)
