@@ -89,7 +89,10 @@ def test_the_3d_view_turns_and_marks_what_the_picture_marks(
     page.mouse.down()
     page.mouse.move(box["x"] + 110, box["y"] + 120)
     page.mouse.up()
-    assert shape(plate) != seen[0]
+    first = (
+        "at => [...at[0].querySelectorAll('polygon')].map(p => p.getAttribute('points')).join(' ')"
+    )
+    page.wait_for_function(f"at => ({first})(at) !== at[1]", arg=[plate.element_handle(), seen[0]])
     view.press("Home")
     node, x, y = view.evaluate(ON_TOP)
     page.mouse.move(x, y)

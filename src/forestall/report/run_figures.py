@@ -175,7 +175,8 @@ def _timeline_key(lanes: Sequence[Lane]) -> list[Artist]:
     """What the signs mean that are there."""
     from matplotlib.lines import Line2D
 
-    there = [any(times) for times in zip(*(_seen(lane) for lane in lanes), strict=True)]
+    seen = [_seen(lane) for lane in lanes]
+    there = [any(times[k] for times in seen) for k in range(len(_SIGNS))]
     return [
         Line2D(
             *([], []),

@@ -199,7 +199,7 @@ def test_profile_and_law_are_options_of_the_world(
         made.update(options)
         return KitchenEnvironment(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("forestall.worlds.kitchen.part.KitchenEnvironment", environment)
+    monkeypatch.setattr("forestall.worlds.kitchen.environment.KitchenEnvironment", environment)
     from forestall.domain.load import shipped
     from forestall.types.scene import SceneNeeds
 

@@ -7,7 +7,7 @@ import pytest
 from forestall.domain.load import shipped
 from forestall.errors import UnknownNameError
 from forestall.types.scene import SceneNeeds
-from forestall.worlds.kitchen import part
+from forestall.worlds.kitchen import environment as environments
 from forestall.worlds.kitchen.environment import KitchenEnvironment
 from forestall.worlds.kitchen.part import Kitchens, NamesOption, Profile
 
@@ -25,7 +25,7 @@ def test_frames_are_remembered_only_where_many_runs_follow(monkeypatch: pytest.M
         made.append(frames)
         return real(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(part, "KitchenEnvironment", environment)
+    monkeypatch.setattr(environments, "KitchenEnvironment", environment)
     kitchens = Kitchens()
     for remember in (False, True, True):
         with kitchens.open(SceneNeeds(), shipped("household"), remember) as opened:
