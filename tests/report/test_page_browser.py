@@ -84,15 +84,17 @@ def test_the_3d_view_turns_and_marks_what_the_picture_marks(
         alarm.get_by_role("button", name=name).click()
         seen.append(shape(plate))
     assert len(set(seen[5:9])) == 4 and seen[-1] == seen[0]
+    view.scroll_into_view_if_needed()
     box = view.bounding_box()
     page.mouse.move(box["x"] + 60, box["y"] + 90)
     page.mouse.down()
     page.mouse.move(box["x"] + 110, box["y"] + 120)
     page.mouse.up()
-    first = (
-        "at => [...at[0].querySelectorAll('polygon')].map(p => p.getAttribute('points')).join(' ')"
+    page.wait_for_function(  # a box is made anew at every turn: it is looked up each time
+        "at => [...at[0].querySelectorAll('[data-node=\"Plate-1\"] polygon')]"
+        ".map(p => p.getAttribute('points')).join(' ') !== at[1]",
+        arg=[view.element_handle(), seen[0]],
     )
-    page.wait_for_function(f"at => ({first})(at) !== at[1]", arg=[plate.element_handle(), seen[0]])
     view.press("Home")
     node, x, y = view.evaluate(ON_TOP)
     page.mouse.move(x, y)

@@ -32,7 +32,7 @@ def test_a_study_is_answered_by_mouse_and_keys_killed_and_resumed(
         home = server.address
         page.goto(home)
         page.get_by_role("button", name="Begin").click()
-        assert page.get_by_role("heading", name="Which explanation is better?").is_visible()
+        page.get_by_role("heading", name="Which explanation is better?").wait_for()
         page.get_by_label("A name or code").fill(LONG)
         page.get_by_label("I have read this").check()
         page.get_by_role("button", name="Begin").click()
@@ -44,11 +44,11 @@ def test_a_study_is_answered_by_mouse_and_keys_killed_and_resumed(
         reached(page, 3, count)
         page.keyboard.press("Backspace")
         reached(page, 2, count)
-        assert page.get_by_role("button", name="Both or cannot tell", pressed=True).is_visible()
+        page.get_by_role("button", name="Both or cannot tell", pressed=True).wait_for()
         page.keyboard.press("b")
         reached(page, 3, count)
         page.get_by_text("Pause").click()
-        assert page.get_by_role("link", name="your own link").is_visible()
+        page.get_by_role("link", name="your own link").wait_for()
         assert_fits(page)
         state = page.context.storage_state()
         page.context.close()  # the rater goes away, the server is stopped

@@ -43,7 +43,7 @@ def test_every_control_of_the_index(tmp_path: Path, chromium: Any, where: str) -
         page.locator("input[name=run]").nth(1).check()
         with page.expect_navigation():
             compare.click()
-        assert page.get_by_role("heading", name="Two runs side by side").is_visible()
+        page.get_by_role("heading", name="Two runs side by side").wait_for()
         assert_fits(page)
         with page.expect_navigation():  # its script is there, too
             page.get_by_role("link", name="All runs").click()
@@ -56,7 +56,7 @@ def test_every_control_of_the_index(tmp_path: Path, chromium: Any, where: str) -
         page.get_by_role("link", name="All runs").click()
         page.get_by_role("link", name="experiment", exact=True).click()
         page.get_by_role("link", name="one").click()
-        assert page.locator("#timeline").is_visible()
+        page.locator("#timeline").wait_for()
         home = server.address
         page.context.close()
     assert all(url.startswith((home, "data:")) for url in asked)
@@ -117,7 +117,7 @@ def test_without_javascript_it_works_as_well(tmp_path: Path, chromium: Any) -> N
         page.get_by_role("button", name="Show").click()
         page.locator("input[name=run]").nth(0).check()
         page.get_by_role("button", name="Compare two runs").click()
-        assert page.get_by_text("Choose two runs to compare; 1 were chosen.").is_visible()
+        page.get_by_text("Choose two runs to compare; 1 were chosen.").wait_for()
         page.context.close()
 
 
