@@ -24,7 +24,7 @@ STATIC = {
     "imports": ["-c", "from importlinter.cli import lint_imports_command as run; run()"],
     "docs": ["-m", "mkdocs", "build", "--strict", "--quiet"],
 }
-TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadgroup"]
+TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadgroup", "--no-loadscope-reorder"]
 FAST = ["-m", "not slow and not simulator"]
 SLIPCOVER = ["-m", "slipcover", "--source", "src/forestall", "--json"]
 """On Python 3.11 a fifth more time for the tests; coverage.py doubles it."""

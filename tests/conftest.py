@@ -35,6 +35,19 @@ def chromium() -> Iterator[Any]:
         browser.close()
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Tests of one file run in one process, with fixtures made once; a group of its own apart."""
+    from xdist.scheduler import LoadGroupScheduling  # type: ignore[import-untyped]
+
+    class ByFile(LoadGroupScheduling):  # type: ignore[misc]
+        def _split_scope(self, nodeid: str) -> str:
+            group = super()._split_scope(nodeid)
+            return nodeid.split("::")[0] if group == nodeid else group
+
+    return ByFile(config, log)
+
+
 ABSENT = tuple(extra for extra in EXTRAS if not installed(extra))
 """Extras that are not installed: what needs one of them is skipped, and says so."""
 

@@ -85,6 +85,9 @@ def test_a_quick_experiment_is_a_balanced_tenth() -> None:
             found = {r.case for r in some if r.case.set == of and r.profile == "honest"}
             if of == "undisturbed":
                 others = {r.case for r in some if r.profile == "honest"} - found
+                if some is quick:
+                    assert len(found) == 1
+                    continue
                 assert found >= {c.twin for c in others if c.twin.set == of}
                 assert len(found) <= max(1, len(others))
                 continue
@@ -164,9 +167,10 @@ def test_a_killed_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_worker_that_dies_leaves_a_failed_episode_and_no_smaller_table(tmp_path: Path) -> None:
-    rows = play(replace(SMALL, workers=1), tmp_path, deadly_row)
+    choice = replace(CHOICE, strategies=("none", "proactive"))  # each death is a start of a worker
+    rows = play(Experiment(choice, workers=1), tmp_path, deadly_row)
     broken = [r for r in rows if r.end == "error"]
-    assert len(rows) == len(runs_for(CHOICE))
+    assert len(rows) == len(runs_for(choice))
     assert {r.task for r in broken} == {DEADLY}
     assert all("died" in r.error and not r.success for r in broken)
 
@@ -308,7 +312,7 @@ def test_a_quick_experiment_has_every_strategy_and_model_and_fewer_demonstration
     honest = [[r for r in some if r.profile == "honest"] for some in (quick, usual)]
     who = [{(r.strategy, r.model) for r in some} for some in honest]
     assert who[0] == who[1]
-    assert {r.demonstrations for r in honest[0]} == {"2 varied"}
+    assert {r.demonstrations for r in honest[0]} == {"1 varied"}
     assert {r.demonstrations for r in honest[1]} == {"8 varied"}
     of = Choice("all", quick=True, demonstrations=4).runs()
     assert "4 varied" in {r.demonstrations for r in of}, "as was said"

@@ -43,7 +43,7 @@ class Options:
         part: of the cases of each set in `all`, from all tasks in turn; 0.05 by default, which is
             an hour on two cores, 1 for every case, which takes many.
         quick: a tenth of it, with fewer demonstrations and fewer strategies on each case: by
-            its own reckoning a quarter of an hour.
+            its own reckoning eight minutes.
         demonstrations: of each task in the honest household, each another way to do it (1 to 32);
             8 by default, 2 in a quick experiment.
         out: folder of the results; what is finished in it is not run again.

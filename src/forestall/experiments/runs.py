@@ -75,12 +75,12 @@ ABLATED = 0.5
 QUICK = 0.1
 """Of the cases that are run otherwise, in a quick experiment."""
 
-QUICK_DEMONSTRATIONS = 2
+QUICK_DEMONSTRATIONS = 1
 """Of each task in the honest household, in a quick experiment."""
 
-QUICK_TURN = 3
-"""Of the strategies that step in on a case of a quick experiment every third does, others with the
-next set."""
+QUICK_TURN = 6
+"""Of the strategies that step in on a case of a quick experiment every sixth does, others with the
+next set. Trying again counts among them there."""
 
 PAPER_DETECTOR = "scene-graph"
 
@@ -200,7 +200,8 @@ class Choice:
         profiles: of the household; by default the honest one, and for "all" both.
         part: of the cases of each set in "all" and "transfer", from all tasks in turn: `PART` by
             default.
-        quick: a tenth of that, and of the strategies that step in one case of each set has a third.
+        quick: a tenth of that; of the strategies that step in one case of each set has a sixth, and
+            of the undisturbed runs there are no twins.
         demonstrations: of each task in the honest household, each another way to do it; by default
             `DEMONSTRATIONS`, `QUICK_DEMONSTRATIONS` in a quick experiment.
         models: whether a language model reasons in an ablation, too.
@@ -273,13 +274,15 @@ def _in(profile: str, choice: Choice) -> Iterator[Run]:
         yield from (Run(c, "watch", profile=profile, demonstrations=told) for c in found)
         return
     run = partial(Run, profile=profile, demonstrations=told)
-    yield from (run(case, s) for found in of_sets.values() for case in found for s in ALONE)
+    alone = ALONE[:2] if choice.quick else ALONE
+    yield from (run(case, s) for found in of_sets.values() for case in found for s in alone)
     if choice.experiment in ("proactive", "all"):
         part = STEPPING_IN if honest and choice.experiment == "all" else 1.0
         turn = QUICK_TURN if choice.quick else 1
         for place, several in enumerate(of_sets.values()):
             for case in _some(several, part):
-                yield from list(_stepping_in(case, run))[place % turn :: turn]
+                more = [run(case, s) for s in ALONE[len(alone) :]]
+                yield from [*more, *_stepping_in(case, run)][place % turn :: turn]
     robofail = of_sets[PAPER_SET]
     if choice.experiment == "detection":
         for case, detector in product(robofail, (PAPER_DETECTOR, *BASELINES)):
@@ -314,7 +317,7 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
         if part < 1:
             every = _some(every, part, TURN * place if honest else 0, place)
         found[of] = every
-    if honest:
+    if honest and not choice.quick:
         chosen = {c.twin for several in found.values() for c in several}
         every = cases(UNDISTURBED, choice.split, choice.rounds, further=True)
         found[UNDISTURBED] = [c for c in every if c in chosen]

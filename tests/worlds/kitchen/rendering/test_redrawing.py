@@ -15,7 +15,7 @@ from forestall.worlds.kitchen.rendering.embree import EmbreeTracer
 from forestall.worlds.kitchen.rendering.picture import RayRenderer
 from forestall.worlds.kitchen.rendering.redrawing import RedrawingRenderer
 
-CAMERA = Intrinsics.from_vertical_fov(321, 241, 60.0)
+CAMERA = Intrinsics.from_vertical_fov(161, 121, 60.0)
 
 
 class Counting(RayRenderer):
