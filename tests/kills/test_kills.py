@@ -60,7 +60,7 @@ def test_nothing_finished_is_lost_or_doubled(
                 break
         code, said = victim.start(folder).end()
         assert code == 0, said
-        assert victim.finished(folder) == whole
+        assert victim.finished(folder) == whole, said
         assert list(_partial(folder)) == []
     record_property("kills", kills)
 
