@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from forestall import Goal, Literal, Monitor, Outcome, Plan, Subtask, Task
 from forestall.domain.load import shipped
-from forestall.domain.looked import looked_into, not_there
+from forestall.domain.looked import looked_into, looked_over, not_there
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.hidden import hiding_places, sought
 from forestall.replanning.searching import with_shutting, without
@@ -108,6 +109,34 @@ def test_of_places_as_likely_the_near_one_comes_first() -> None:
     assert hiding_places("Mug", scene, DOMAIN, (), (9, 0))[0] == "Fridge-1"
 
 
+def test_in_pictures_what_is_open_is_gone_to_as_well() -> None:
+    scene = scene_graph(
+        {
+            "objects": {
+                "Cabinet-1": {"open": "closed", "box": box(3)},
+                "CounterTop-1": {"box": box(3)},
+                "GarbageCan-1": {"box": box(3)},
+                "StoveBurner-1": {"box": box(3)},
+                "Floor-1": {"box": box(3)},
+            }
+        }
+    )
+    assert hiding_places("Pot", scene, DOMAIN, (), (0, 0)) == ["Cabinet-1"]
+    order = hiding_places("Mug", scene, DOMAIN, (), (0, 0), pictured=True)
+    assert order == ["CounterTop-1", "Cabinet-1", "GarbageCan-1"], "nothing must be opened there"
+
+
+def test_what_is_looked_over_is_where_the_last_step_was_done() -> None:
+    told = {
+        "objects": {"Egg-1": {}, "Plate-1": {}, "CounterTop-1": {}, "CounterTop-2": {}},
+        "relations": [["Egg-1", "on_top_of", "Plate-1"], ["Plate-1", "on_top_of", "CounterTop-1"]],
+    }
+    over = looked_over(scene_graph(told), Subtask.parse("pick_up(Egg-1)"), DOMAIN)
+    assert over == {"Egg-1", "Plate-1", "CounterTop-1"}
+    shut = scene_graph({**told, "hidden": ["CounterTop-1"]})
+    assert looked_over(shut, Subtask.parse("navigate_to_obj(CounterTop-1)"), DOMAIN) == frozenset()
+
+
 def test_what_holds_many_things_comes_before_what_holds_one() -> None:
     assert hiding_places("Mug", graph("Microwave-1", "Cabinet-1"), DOMAIN, ())[0] == "Cabinet-1"
 
@@ -206,9 +235,17 @@ def test_after_all_places_it_says_where_it_looked() -> None:
     seen = scene_graph({"objects": shown["objects"]})
     looked = looked_into(seen, DOMAIN)
     assert looked == set(SHUT)
-    facts = not_there("Egg", looked, DOMAIN)
     context = episodes.context("store-egg", PLANS["store-egg"], 0, seen)
     replanner = PlannerReplanner(GraphValidator(DOMAIN), DOMAIN)
+    facts = not_there("Egg", looked, DOMAIN)
     answer = replanner.replan(context, Diagnosis("a cause", wanted, facts))
-    assert answer.plan is None
-    assert "Egg was looked for in Cabinet-1, Fridge-1, Microwave-1 and is not there" in answer.note
+    assert answer.note == "looking for Egg in CounterTop-1", (
+        "a picture may not show all that is on it"
+    )
+    given = replace(context, observation=None)
+    everywhere = not_there("Egg", {*looked, "CounterTop-1"}, DOMAIN)
+    for known, where in ((context, everywhere), (given, facts)):
+        answer = replanner.replan(known, Diagnosis("a cause", wanted, where))
+        assert answer.plan is None
+        places = ", ".join(sorted(x.args[1] for x in where))
+        assert f"Egg was looked for in {places} and is not there" in answer.note

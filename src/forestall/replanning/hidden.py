@@ -1,8 +1,8 @@
-"""Where a thing may be that nobody has seen: in what is shut and may hold it.
+"""Where a thing may be that nobody has seen: in what is shut, and behind what stands in the view.
 
-Called by the replanner; calls nothing that plans. Opening and looking is a plan like any other;
-what is found changes the graph, and the plan goes on or another place is opened. Each place is
-looked into once: that a thing is not there is a fact that stays (`domain.looked`).
+Called by the replanner; calls nothing that plans. Going there, opening and looking is a plan like
+any other; what is found changes the graph, and the plan goes on or another place is looked at. Each
+place is looked at once: that a thing is not there is a fact that stays (`domain.looked`).
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ from forestall.types.verdict import Reference
 SHOWN = 8.0
 """How many times as likely a kind of place is in which demonstrations had the thing."""
 FOR_FEW = 0.25
-"""How many times as likely a place is that does not hold many things by nature."""
+"""How many times as likely a place is that does not hold many things by nature, or is avoided."""
 IN_VAIN = " and is not there"
 
-LOOK_S = 5.0
-"""What it takes to open a place and look, the way there apart."""
+LOOK_S = 2.0
+"""What it takes to look at a place, the way there apart."""
+OPEN_S = 6.0
+"""What it takes more to open it before, and to shut it where nothing was found."""
 
 
 def sought(wanted: Sequence[Literal], graph: SceneGraph) -> tuple[str, ...]:
@@ -40,12 +42,14 @@ def hiding_places(
     domain: Domain,
     references: Sequence[Reference],
     start: Spot | None = None,
+    pictured: bool = False,
 ) -> list[str]:
-    """Shut places that take a thing, by chance for each second that it takes to look.
+    """Places that take a thing and may hide it, by chance for each second that it takes to look.
 
     That order finds it in the least time on average. A kind of place in which demonstrations had it
     is likelier, then one that holds many things by nature, then one that takes few kinds of things:
-    what is particular is likelier than what takes everything. Ties by name.
+    what is particular is likelier than what takes everything. Ties by name. What is shut hides
+    everything; in or on what is open a thing may lie behind another one, where no picture shows it.
 
     Args:
         thing: category or instance.
@@ -53,24 +57,36 @@ def hiding_places(
         domain: which places take it.
         references: demonstrations of this step.
         start: where the robot stands, x and y in metres; None: every way is as long.
+        pictured: whether pictures show what is known, in which one thing can hide another.
     """
     kind = category_of(domain.canonical(thing))
-    places = [
-        n
-        for n in graph.nodes
-        if n.seen is not Seen.UNOBSERVED
-        and domain.encloses(n.category)
-        and domain.accepts(n.category, kind)
-        and is_shut(domain, n.category, dict(n.states)) is Truth.TRUE
+    takes = [
+        n for n in graph.nodes if n.seen is not Seen.UNOBSERVED and domain.accepts(n.category, kind)
     ]
+    shut = {n.id for n in takes if is_shut_place(n, domain)}
+    places = [n for n in takes if n.id in shut or (pictured and _has_many(n.category, domain))]
     chances = _chances(kind, {n.category for n in places}, domain, references)
     spots = positions(graph)
 
     def promise(node: ObjectNode) -> tuple[float, str]:
         way = 0.0 if start is None else way_s(domain, ("", start), (node.id, spots.get(node.id)))
-        return -chances[node.category] / (way + LOOK_S), node.id
+        looking_s = LOOK_S + (OPEN_S if node.id in shut else 0.0)
+        return -chances[node.category] / (way + looking_s), node.id
 
     return [n.id for n in sorted(places, key=promise)]
+
+
+def is_shut_place(node: ObjectNode, domain: Domain) -> bool:
+    """Whether it must be opened before anybody sees what is in it."""
+    shut = is_shut(domain, node.category, dict(node.states))
+    return domain.encloses(node.category) and shut is Truth.TRUE
+
+
+def _has_many(category: str, domain: Domain) -> bool:
+    """Whether it is a place, other than the ground, that has many things in or on it by nature."""
+    if domain.is_a(category, domain.roles.ground):
+        return False
+    return any(domain.is_a(category, r) for r in (domain.roles.crowded, domain.roles.support))
 
 
 def _chances(
@@ -84,9 +100,14 @@ def _chances(
         for parent in r.graph.parents(name, domain.containing)
         if (node := r.graph.get(parent)) is not None
     }
+
+    def usual(category: str) -> bool:
+        avoided = any(domain.is_a(category, tag) for tag in domain.roles.avoid)
+        return _has_many(category, domain) and not avoided
+
     return {
         c: (SHOWN if c in shown else 1.0)
-        * (1.0 if domain.is_a(c, domain.roles.crowded) else FOR_FEW)
+        * (1.0 if usual(c) else FOR_FEW)
         / max(1, sum(domain.accepts(c, other) for other in domain.categories))
         for c in categories
     }

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 
 from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.formula import TRUE as ALWAYS
-from forestall.domain.looked import looked_into, not_there
+from forestall.domain.looked import looked_into, looked_over, not_there
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import truth
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
+from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal, Truth
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
@@ -73,6 +74,7 @@ class Intervention:
         self._attempts: dict[tuple[Literal, ...] | Subtask, int] = {}
         self._sought: frozenset[str] = frozenset()
         self._looked: frozenset[str] = frozenset()
+        self._over: frozenset[str] = frozenset()
 
     def begin(self, context: BoundaryContext) -> None:
         """To be called before every subtask: forgets the last episode when a new one begins."""
@@ -80,8 +82,13 @@ class Intervention:
             self._resume_left = len(context.plan)
             if context.index == 0:
                 self._attempts.clear()
-                self._sought = self._looked = frozenset()
-        self._looked |= looked_into(context.graph, self._validator.domain)
+                self._sought = self._looked = self._over = frozenset()
+        domain = self._validator.domain
+        self._looked |= looked_into(context.graph, domain)
+        here: frozenset[str] = frozenset()
+        if context.executed and context.executed[-1][1] is SkillStatus.SUCCEEDED:
+            here = looked_over(context.graph, context.executed[-1][0], domain)
+        self._over = self._over | here if self._sought else here
 
     def repairs(self, context: BoundaryContext) -> bool:
         """Whether the subtask belongs to a repair, for which there is no demonstration."""
@@ -235,7 +242,7 @@ class Intervention:
         """A diagnosis with where the things that nobody sees are not: where one has looked."""
         lost = [x.args[0] for x in diagnosis.must_change if x.predicate == LOCATED]
         domain = self._validator.domain
-        empty = [f for name in lost for f in not_there(name, self._looked, domain)]
+        empty = [f for name in lost for f in not_there(name, self._looked | self._over, domain)]
         must_stay = tuple(dict.fromkeys((*diagnosis.must_stay, *empty)))
         return replace(diagnosis, must_stay=must_stay) if empty else diagnosis
 
