@@ -14,6 +14,14 @@ from forestall.types.graph import SceneGraph, Seen
 from forestall.types.plan import Subtask
 
 
+def in_sight(category: str, domain: Domain) -> bool:
+    """Whether it has many things in or on it by nature, and nothing must be opened to see them."""
+    is_a, roles = domain.is_a, domain.roles
+    if is_a(category, roles.ground) or domain.encloses(category):
+        return False
+    return is_a(category, roles.crowded) or is_a(category, roles.support)
+
+
 def looked_into(graph: SceneGraph, domain: Domain) -> frozenset[str]:
     """Places that can be shut and whose inside is in sight."""
     return frozenset(

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from forestall.domain.looked import in_sight
 from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
@@ -20,7 +21,7 @@ from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, placing, take_states, unlocated
-from forestall.perception.support import Parent, circular, parents
+from forestall.perception.support import CONTAINMENT, Parent, circular, parents
 from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import (
     Fate,
@@ -37,6 +38,7 @@ from forestall.perception.tracks import (
     vec,
 )
 from forestall.perception.unproject import Points, robust_box
+from forestall.perception.unseen import unseen_m2
 from forestall.types.facts import Change, Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
@@ -374,7 +376,19 @@ class SceneMemory:
             last_seen_s=track.last_seen_s,
             feature=track.feature,
             presumed=tuple((a, v) for a, v in track.presumed.items() if states.get(a, v) is None),
+            unseen_m2=self._unseen_m2(track),
         )
+
+    def _unseen_m2(self, track: Track) -> float:
+        """Of what has many things in or on it by nature, and is not shut or the ground."""
+        if track.points_world_m is None or not in_sight(track.category, self._domain):
+            return 0.0
+        relation = self._domain.offers(track.category)
+        top = relation is None or self._domain.predicates[relation].geometry != CONTAINMENT
+        others = [
+            t for t in self.tracks.values() if t is not track and t.points_world_m is not None
+        ]
+        return unseen_m2(track, others, top, self._config)
 
     # --- small questions ------------------------------------------------------------------------
 

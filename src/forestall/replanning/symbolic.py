@@ -164,9 +164,13 @@ class PlannerReplanner:
         attempts.refused = unexplained(state, context.refused)
         for name in lost:
             empty = searched(name, known, self.domain)
-            pictured = context.observation is not None and bool(context.observation.frames)
             places = hiding_places(
-                name, context.graph, self.domain, context.references, _stands_at(context), pictured
+                name,
+                context.graph,
+                self.domain,
+                context.references,
+                _stands_at(context),
+                context.task.plan,
             )
             opened = [p for p in empty if self.domain.encloses(state.kinds.get(p, p))]
             shutting = self._to(attempts, state, as_usual(state, opened)).subtasks if opened else ()
