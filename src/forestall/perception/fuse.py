@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from forestall.domain.looked import in_sight
 from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
@@ -21,7 +20,7 @@ from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
 from forestall.perception.sightings import gather, placing, take_states, unlocated
-from forestall.perception.support import CONTAINMENT, Parent, circular, parents
+from forestall.perception.support import Parent, circular, parents
 from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import (
     Fate,
@@ -38,7 +37,7 @@ from forestall.perception.tracks import (
     vec,
 )
 from forestall.perception.unproject import Points, robust_box
-from forestall.perception.unseen import unseen_m2
+from forestall.perception.unseen import look_over, unseen_m2
 from forestall.types.facts import Change, Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
@@ -211,11 +210,7 @@ class SceneMemory:
         return moved
 
     def _children(self, name: str) -> list[Track]:
-        return [
-            t
-            for _, t in sorted(self.tracks.items())
-            if t.parent is not None and t.parent[1] == name
-        ]
+        return [t for _, t in sorted(self.tracks.items()) if t.parent and t.parent[1] == name]
 
     def _drop_from_memory(self, former: str, seen: set[str]) -> None:
         """What is no longer held and not in view may be anywhere, with what is in it."""
@@ -332,6 +327,7 @@ class SceneMemory:
                     track.interior_seen = False
                 elif shut is Truth.FALSE and name in seen:
                     track.interior_seen |= interior_observed(track, views, self._config)
+        look_over(self.tracks.values(), views, self._domain, self._config)
         held = {h.holding for h in self._hands}
         noted = {n for n in unlocated(views) if self.tracks[n].vague}
         for name, track in self.tracks.items():
@@ -376,19 +372,8 @@ class SceneMemory:
             last_seen_s=track.last_seen_s,
             feature=track.feature,
             presumed=tuple((a, v) for a, v in track.presumed.items() if states.get(a, v) is None),
-            unseen_m2=self._unseen_m2(track),
+            unseen_m2=unseen_m2(track, self.tracks.values(), self._domain, self._config),
         )
-
-    def _unseen_m2(self, track: Track) -> float:
-        """Of what has many things in or on it by nature, and is not shut or the ground."""
-        if track.points_world_m is None or not in_sight(track.category, self._domain):
-            return 0.0
-        relation = self._domain.offers(track.category)
-        top = relation is None or self._domain.predicates[relation].geometry != CONTAINMENT
-        others = [
-            t for t in self.tracks.values() if t is not track and t.points_world_m is not None
-        ]
-        return unseen_m2(track, others, top, self._config)
 
     # --- small questions ------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ from forestall.types.verdict import Reference
 SHOWN = 8.0
 """How many times as likely a kind of place is in which demonstrations had the thing."""
 PLANNED = 19.0
-"""The same where the task's plan takes it from: what it opens first, else what is open. Whoever made
+"""The same where the task's plan takes it from: what it opens first, else what is open. Who made
 the plan knew the place, and is believed to be wrong about that in one of twenty."""
 FOR_FEW = 0.25
 """How many times as likely a place is that does not hold many things by nature, or is avoided."""
