@@ -179,6 +179,8 @@ def test_a_place_that_must_not_stay_open_is_shut_once_the_thing_is_out_of_it() -
     assert rest(*shut_anyway) == list(shut_anyway)
     opened_again = ("pick_up(Egg)", "open_obj(Fridge)", "close_obj(Fridge)")
     assert rest(*opened_again) == [opened_again[0], "close_obj(Fridge-1)", *opened_again[1:]]
+    own_way = ("open_obj(Fridge)", "pick_up(Egg)", "put_in(Egg, Fridge)", "close_obj(Fridge)")
+    assert rest(*own_way) == list(own_way), "shut in between, nothing could be put in"
     assert rest("crack_obj(Egg)")[1:] == [str(s) for s in shutting]
 
 
