@@ -6,17 +6,19 @@ Owned and changed by the monitor only; calls name resolution (`grounding.py`).
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from forestall.domain.brought import came_about
 from forestall.domain.names import executable, ground_subtask
 from forestall.errors import InputError
 from forestall.in_a_row import Streaks
 from forestall.senses import Senses
 from forestall.types.episode import ExecutedRecord, SkillOutcome, SkillStatus
-from forestall.types.facts import category_of, is_instance
+from forestall.types.facts import Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask, same_step
@@ -25,6 +27,10 @@ from forestall.types.task import Task
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
+
+
+OFTEN = 2
+"""So often in a row something comes to nothing before another way is looked for: once is a slip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +87,8 @@ class RunState:
         bound: category → the instance that it means.
         executed: what was tried.
         refusals: what the robot refused.
+        acted: what it has done last, so far as it knows; what comes of it is seen next.
+        fruitless: how often in a row a subtask came to nothing.
         graph: everything that is believed.
         robot_world_m: where the robot stands.
         worked_at: where the hand let go last.
@@ -103,6 +111,8 @@ class RunState:
     bound: dict[str, str] = field(default_factory=dict)
     executed: list[ExecutedRecord] = field(default_factory=list)
     refusals: list[Refusal] = field(default_factory=list)
+    acted: Subtask | None = None
+    fruitless: Counter[Subtask] = field(default_factory=Counter)
     graph: SceneGraph = field(default_factory=lambda: SceneGraph(()))
     final: SceneGraph | None = None
     robot_world_m: Vec3 = (0.0, 0.0, 0.0)
@@ -135,6 +145,24 @@ class RunState:
             for r in self.refusals
             if around(self.graph, r.subtask, self.domain) == r.around
         }
+
+    def vain(self) -> tuple[Subtask, ...]:
+        """What was tried twice or more in a row and came to nothing each time."""
+        counted = self.fruitless + Counter(self._nothing_of_it())
+        return tuple(sorted(s for s, times in counted.items() if times >= OFTEN))
+
+    def _nothing_of_it(self) -> tuple[Subtask, ...]:
+        """The newest subtask, if what it was to bring about is seen not to be so."""
+        if self.acted is None or came_about(self.graph, self.acted, self.domain) is not Truth.FALSE:
+            return ()
+        return (self.acted,)
+
+    def _note_fruit(self) -> None:
+        """What was seen since the newest subtask counts."""
+        if self.acted is not None and came_about(self.graph, self.acted, self.domain) is Truth.TRUE:
+            del self.fruitless[self.acted]
+        self.fruitless.update(self._nothing_of_it())
+        self.acted = None
 
     def command(self, subtask: Subtask, position: int) -> Subtask:
         """What to send to the robot for a grounded subtask of the plan."""
@@ -204,6 +232,7 @@ class RunState:
         if self.last is None or not self.ready:
             raise InputError("no subtask was judged before: call before(observation) first")
         self.close_boundary()
+        self._note_fruit()
         subtask = self.last.subtask
         for name in subtask.args:
             if is_instance(name):
@@ -218,7 +247,10 @@ class RunState:
         self.position += 1
         self.ready = False
         self.streaks.executed(outcome.status is SkillStatus.SUCCEEDED)
+        if outcome.status is SkillStatus.FAILED:
+            self.fruitless[subtask] += 1
         if outcome.status is SkillStatus.SUCCEEDED:
+            self.acted = subtask
             self.senses.done(bool(self.domain.skill(command.skill).effects))
 
     def context(
@@ -247,6 +279,7 @@ class RunState:
             replans=self.replans,
             when=when,
             refused=tuple(self.refused()),
+            vain=self.vain(),
             executed=tuple((e.subtask, e.outcome.status) for e in self.executed),
         )
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from forestall import Goal, Literal, Monitor, Outcome, Plan, Subtask, Task
 from forestall.domain.load import shipped
-from forestall.domain.looked import looked_into, not_there
+from forestall.domain.looked import looked_into, looked_over, not_there
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.hidden import hiding_places, sought
 from forestall.replanning.searching import with_shutting, without
@@ -108,6 +109,57 @@ def test_of_places_as_likely_the_near_one_comes_first() -> None:
     assert hiding_places("Mug", scene, DOMAIN, (), (9, 0))[0] == "Fridge-1"
 
 
+def unseen_on(told: dict[str, Any], areas_m2: dict[str, float]) -> SceneGraph:
+    """A scene of which views have not shown so much of some places."""
+    scene = scene_graph(told)
+    nodes = [replace(n, unseen_m2=areas_m2.get(n.id, 0.0)) for n in scene.nodes]
+    return replace(scene, nodes=tuple(nodes))
+
+
+def test_of_what_is_open_that_counts_which_no_view_has_shown() -> None:
+    told = {
+        "objects": {
+            "Cabinet-1": {"open": "closed", "box": box(3)},
+            "CounterTop-1": {"box": box(3)},
+            "CounterTop-2": {"box": box(3)},
+            "CounterTop-3": {"box": box(3)},
+            "StoveBurner-1": {"box": box(3)},
+            "Floor-1": {"box": box(3)},
+        }
+    }
+    assert hiding_places("Mug", scene_graph(told), DOMAIN, (), (0, 0)) == ["Cabinet-1"]
+    areas = {"CounterTop-1": 0.05, "CounterTop-3": 0.1, "StoveBurner-1": 0.2, "Floor-1": 0.2}
+    scene = unseen_on(told, areas)
+    where = hiding_places("Mug", scene, DOMAIN, (), (0, 0))
+    assert where == ["Cabinet-1", "CounterTop-3", "CounterTop-1"]
+
+
+def test_what_a_plan_takes_from_the_open_is_looked_for_there_first() -> None:
+    told = {
+        "objects": {
+            "Cabinet-1": {"open": "closed", "box": box(3)},
+            "Fridge-1": {"open": "closed", "box": box(3)},
+            "CounterTop-1": {"box": box(3)},
+        }
+    }
+    scene = unseen_on(told, {"CounterTop-1": 0.1})
+    plain = Plan.parse(["navigate_to_obj(Egg)", "pick_up(Egg)"])
+    opening = Plan.parse(["open_obj(Fridge)", "navigate_to_obj(Egg)", "pick_up(Egg)"])
+    for plan, first in ((None, "Fridge-1"), (plain, "CounterTop-1"), (opening, "Fridge-1")):
+        assert hiding_places("Egg", scene, DOMAIN, (), (0, 0), plan)[0] == first
+
+
+def test_what_is_looked_over_is_where_the_last_step_was_done() -> None:
+    told = {
+        "objects": {"Egg-1": {}, "Plate-1": {}, "CounterTop-1": {}, "CounterTop-2": {}},
+        "relations": [["Egg-1", "on_top_of", "Plate-1"], ["Plate-1", "on_top_of", "CounterTop-1"]],
+    }
+    over = looked_over(scene_graph(told), Subtask.parse("pick_up(Egg-1)"), DOMAIN)
+    assert over == {"Egg-1", "Plate-1", "CounterTop-1"}
+    shut = scene_graph({**told, "hidden": ["CounterTop-1"]})
+    assert looked_over(shut, Subtask.parse("navigate_to_obj(CounterTop-1)"), DOMAIN) == frozenset()
+
+
 def test_what_holds_many_things_comes_before_what_holds_one() -> None:
     assert hiding_places("Mug", graph("Microwave-1", "Cabinet-1"), DOMAIN, ())[0] == "Cabinet-1"
 
@@ -127,6 +179,8 @@ def test_a_place_that_must_not_stay_open_is_shut_once_the_thing_is_out_of_it() -
     assert rest(*shut_anyway) == list(shut_anyway)
     opened_again = ("pick_up(Egg)", "open_obj(Fridge)", "close_obj(Fridge)")
     assert rest(*opened_again) == [opened_again[0], "close_obj(Fridge-1)", *opened_again[1:]]
+    own_way = ("open_obj(Fridge)", "pick_up(Egg)", "put_in(Egg, Fridge)", "close_obj(Fridge)")
+    assert rest(*own_way) == list(own_way), "shut in between, nothing could be put in"
     assert rest("crack_obj(Egg)")[1:] == [str(s) for s in shutting]
 
 
@@ -206,9 +260,26 @@ def test_after_all_places_it_says_where_it_looked() -> None:
     seen = scene_graph({"objects": shown["objects"]})
     looked = looked_into(seen, DOMAIN)
     assert looked == set(SHUT)
-    facts = not_there("Egg", looked, DOMAIN)
     context = episodes.context("store-egg", PLANS["store-egg"], 0, seen)
     replanner = PlannerReplanner(GraphValidator(DOMAIN), DOMAIN)
+    facts = not_there("Egg", looked, DOMAIN)
     answer = replanner.replan(context, Diagnosis("a cause", wanted, facts))
     assert answer.plan is None
     assert "Egg was looked for in Cabinet-1, Fridge-1, Microwave-1 and is not there" in answer.note
+
+
+def test_where_something_may_stand_behind_a_thing_it_is_gone_to_and_nothing_opened() -> None:
+    scene = unseen_on(Kitchen("Fridge-1").look(), {"CounterTop-1": 0.1})
+    wanted = Diagnosis("a cause", (Literal.parse("located(Egg)"),))
+    context = episodes.context("store-egg", PLANS["store-egg"], 0, scene)
+    replanner = PlannerReplanner(GraphValidator(DOMAIN), DOMAIN)
+    places: list[str] = []
+    while (answer := replanner.replan(context, wanted)).plan is not None:
+        places.append(answer.note.removeprefix("looking for Egg in "))
+        assert answer.looking_for == ("Egg",)
+        first, *rest = answer.plan.subtasks
+        if places[-1] == "CounterTop-1":
+            assert str(first) == "navigate_to_obj(CounterTop-1)"
+            assert tuple(rest) == context.remaining()
+        wanted = replace(wanted, must_stay=not_there("Egg", places, DOMAIN))
+    assert "CounterTop-1" in places and len(set(places)) == len(places) > 1

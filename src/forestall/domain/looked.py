@@ -11,6 +11,15 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph, Seen
+from forestall.types.plan import Subtask
+
+
+def in_sight(category: str, domain: Domain) -> bool:
+    """Whether it has many things in or on it by nature, and nothing must be opened to see them."""
+    is_a, roles = domain.is_a, domain.roles
+    if is_a(category, roles.ground) or domain.encloses(category):
+        return False
+    return is_a(category, roles.crowded) or is_a(category, roles.support)
 
 
 def looked_into(graph: SceneGraph, domain: Domain) -> frozenset[str]:
@@ -21,6 +30,17 @@ def looked_into(graph: SceneGraph, domain: Domain) -> frozenset[str]:
         if n.seen is Seen.VISIBLE and n.id not in graph.hidden and domain.encloses(n.category)
         and is_shut(domain, n.category, dict(n.states)) is Truth.FALSE
     )  # fmt: skip
+
+
+def looked_over(graph: SceneGraph, done: Subtask, domain: Domain) -> frozenset[str]:
+    """Places in sight and not shut at which the robot stands: those of the step it did last."""
+    here = list(graph.matches(done.args[-1])) if done.args else []
+    for name in here:  # grows: what each of them is in or on
+        here += [p for p in graph.parents(name, domain.containing) if p not in here]
+    found = (graph.get(name) for name in here)
+    return frozenset(
+        n.id for n in found if n is not None and n.seen is Seen.VISIBLE and n.id not in graph.hidden
+    )
 
 
 def not_there(name: str, places: Iterable[str], domain: Domain) -> tuple[Literal, ...]:

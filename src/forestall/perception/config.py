@@ -107,6 +107,9 @@ class PerceptionConfig:
         unlike_m: metres that it counts to differ wholly in colour, or in size by a factor of 2.7,
             where several things are near enough.
         unlike_far_m: the same for things that come back at another place.
+        cell_m: edge of a cell of a surface that some view has shown or none has.
+        over_m: how far over it a view must reach to have shown it.
+        piece_cells: edge of the least piece, in cells, that counts as never shown.
         same_surface_share: share of what an untracked view shows of a piece of furniture that must
             lie on what is known of it, or the other way round, to be the same piece.
     """
@@ -154,6 +157,9 @@ class PerceptionConfig:
     vertical_cosine: float = 0.9
     lateral_cosine: float = 0.8
     frontal_cosine: float = 0.9
+    cell_m: float = 0.05
+    over_m: float = 0.03
+    piece_cells: int = 2
     hand_wide_m: float = 0.09
     hand_long_m: float = 0.30
     hand_thick_m: float = 0.05

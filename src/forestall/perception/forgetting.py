@@ -52,6 +52,7 @@ def merge_renamed(
             known = {a: v for a, v in tracks[old].states.items() if v is not None}
             tracks[new].states = {**known, **tracks[new].states}
             tracks[new].interior_seen |= tracks[old].interior_seen
+            tracks[new].shown = np.union1d(tracks[new].shown, tracks[old].shown)
             remove(tracks, old, new)
 
 

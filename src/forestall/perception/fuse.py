@@ -37,6 +37,7 @@ from forestall.perception.tracks import (
     vec,
 )
 from forestall.perception.unproject import Points, robust_box
+from forestall.perception.unseen import look_over, unseen_m2
 from forestall.types.facts import Change, Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
@@ -209,11 +210,7 @@ class SceneMemory:
         return moved
 
     def _children(self, name: str) -> list[Track]:
-        return [
-            t
-            for _, t in sorted(self.tracks.items())
-            if t.parent is not None and t.parent[1] == name
-        ]
+        return [t for _, t in sorted(self.tracks.items()) if t.parent and t.parent[1] == name]
 
     def _drop_from_memory(self, former: str, seen: set[str]) -> None:
         """What is no longer held and not in view may be anywhere, with what is in it."""
@@ -330,6 +327,7 @@ class SceneMemory:
                     track.interior_seen = False
                 elif shut is Truth.FALSE and name in seen:
                     track.interior_seen |= interior_observed(track, views, self._config)
+        look_over(self.tracks.values(), views, self._domain, self._config)
         held = {h.holding for h in self._hands}
         noted = {n for n in unlocated(views) if self.tracks[n].vague}
         for name, track in self.tracks.items():
@@ -374,6 +372,7 @@ class SceneMemory:
             last_seen_s=track.last_seen_s,
             feature=track.feature,
             presumed=tuple((a, v) for a, v in track.presumed.items() if states.get(a, v) is None),
+            unseen_m2=unseen_m2(track, self.tracks.values(), self._domain, self._config),
         )
 
     # --- small questions ------------------------------------------------------------------------

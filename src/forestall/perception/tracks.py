@@ -28,7 +28,8 @@ class Track:
     view that showed it showed it where it was before, `vague` that it was seen and never located,
     `presumed` what skills should have made of states since they were read. `sightings` counts the
     views that showed it, `shown_m2` is the largest area that one of them showed, `doubted` is
-    another category that a single view of the newest observation called it.
+    another category that a single view of the newest observation called it, `shown` the cells of
+    its surface that views have shown (`unseen.py`).
     """
 
     id: str
@@ -52,6 +53,7 @@ class Track:
     vague: bool = False
     doubted: str | None = None
     shown_m2: float = 0.0
+    shown: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def move(self, offset_m: Points) -> None:
         """Shift everything that is remembered of its place."""

@@ -26,7 +26,7 @@ def will_do(
     Args:
         context: the plan that was followed.
         plan: what is followed instead.
-        sought: things that are looked for in a place which it opens.
+        sought: things that are looked for in a place which it goes to or opens.
         domain: schemas.
         spoken: words.
     """
@@ -37,6 +37,7 @@ def will_do(
     told = [_told(g, b, domain, spoken) for g, b in _with_last(groups)]
     if sought:
         there = listed([spoken.the(n) for n in sought], "or")
+        told = told or [spoken.step(s) for s in plan.subtasks[:1] if domain.drives(s)]
         return f"I {listed([*told, f'look for {there} there'])}"
     if not told:
         not_done = [f"not {spoken.step(s)}" for s in left_out[:_MOST]]

@@ -45,16 +45,18 @@ def with_shutting(
     """What is left of a plan, with a place shut again once the thing is out of it.
 
     The robot stands there then; where the plan does not take the thing, it is shut at the end.
-    Where the plan shuts it anyway before it opens it again, nothing is put in.
+    Where the plan shuts it anyway before it opens it again, or opens it again before it has the
+    thing, nothing is put in: it is open for what the plan does with it then.
     """
     acting = _acting(shutting, domain)
-    theirs = [s for s in rest if any(_same(s, one) for one in (*acting[-1:], *opening[-1:]))]
-    if not acting or (theirs and _same(theirs[0], acting[-1])):
-        return tuple(rest)
     own = {thing, category_of(domain.canonical(thing))}
-    for k, step in enumerate(rest):
-        if own & set(_taken(step, domain)):
-            return (*rest[: k + 1], *acting, *rest[k + 1 :])
+    taking = next((k for k, s in enumerate(rest) if own & set(_taken(s, domain))), len(rest))
+    both = (*acting[-1:], *opening[-1:])
+    theirs = [k for k, s in enumerate(rest) if any(_same(s, one) for one in both)]
+    if not acting or (theirs and (theirs[0] < taking or _same(rest[theirs[0]], acting[-1]))):
+        return tuple(rest)
+    if taking < len(rest):
+        return (*rest[: taking + 1], *acting, *rest[taking + 1 :])
     return (*rest, *shutting)
 
 

@@ -21,7 +21,13 @@ from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
 from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
 from forestall.replanning.cheaper import Asked, cheaper
-from forestall.replanning.hidden import IN_VAIN, hiding_places, in_vain, sought
+from forestall.replanning.hidden import (
+    IN_VAIN,
+    hiding_places,
+    in_vain,
+    is_shut_place,
+    sought,
+)
 from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
 from forestall.replanning.searching import as_usual, with_shutting, without
 from forestall.seams import PlanValidator
@@ -149,28 +155,33 @@ class PlannerReplanner:
         lost: tuple[str, ...],
         known: Sequence[Literal],
     ) -> Replan | None:
-        """Open a shut place in which something may be that nobody has seen; None: there is none.
+        """Go where something may be that nobody has seen, open what is shut; None: there is none.
 
         What was left of the plan follows as it stands: it cannot be checked before the thing is
         found, and is then.
         """
-        shut = self.domain.roles.shut
-        if shut is None:
-            return None
         state = observed(context.graph, self.domain)
         attempts.refused = unexplained(state, context.refused)
         for name in lost:
             empty = searched(name, known, self.domain)
             places = hiding_places(
-                name, context.graph, self.domain, context.references, _stands_at(context)
+                name,
+                context.graph,
+                self.domain,
+                context.references,
+                _stands_at(context),
+                context.task.plan,
             )
-            shutting = self._to(attempts, state, as_usual(state, empty)).subtasks if empty else ()
+            opened = [p for p in empty if self.domain.encloses(state.kinds.get(p, p))]
+            shutting = self._to(attempts, state, as_usual(state, opened)).subtasks if opened else ()
             for place in (p for p in places if p not in empty):
                 found = self._look_into(attempts, context, state, place, shutting)
                 if found is None or found.plan is None:
                     continue
                 after = run(state, found.plan.subtasks).final
-                again = as_usual(after, (place,))
+                again = (
+                    as_usual(after, (place,)) if self.domain.encloses(state.kinds[place]) else ()
+                )
                 closing = self._to(attempts, after, again).subtasks if again else ()
                 rest = without(context.remaining(), shutting, self.domain)
                 opening = found.plan.subtasks
@@ -188,9 +199,15 @@ class PlannerReplanner:
         place: str,
         shutting: tuple[Subtask, ...],
     ) -> Replan | None:
-        """Steps that open a place, after those that shut others."""
-        opened = Literal(self.domain.roles.shut or "", (place,), "false")
-        start = run(state, shutting).final
+        """Steps that go to a place and open it where it is shut, after those that shut others."""
+        start, driving = run(state, shutting).final, self.domain.driving()
+        shut, node = self.domain.roles.shut, context.graph.get(place)
+        if shut is None or node is None or not is_shut_place(node, self.domain):
+            if driving is None:
+                return None
+            steps = (*shutting, Subtask(driving.name, (place,)))
+            return self._checked(attempts, context, state, steps, Goal(""))
+        opened = Literal(shut, (place,), "false")
         for kept in (hand(start, [opened]), []):
             planned = self._to(attempts, start, (opened, *kept))
             if planned.subtasks:

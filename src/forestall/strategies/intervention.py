@@ -10,12 +10,12 @@ import time
 from dataclasses import dataclass, field, replace
 
 from forestall.domain.asked import asked_of, is_asked
-from forestall.domain.formula import TRUE as ALWAYS
-from forestall.domain.looked import looked_into, not_there
+from forestall.domain.brought import came_about
+from forestall.domain.looked import looked_into, looked_over, not_there
 from forestall.domain.model import LOCATED, Domain
-from forestall.domain.truth import truth
 from forestall.seams import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
+from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal, Truth
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
@@ -73,6 +73,7 @@ class Intervention:
         self._attempts: dict[tuple[Literal, ...] | Subtask, int] = {}
         self._sought: frozenset[str] = frozenset()
         self._looked: frozenset[str] = frozenset()
+        self._over: frozenset[str] = frozenset()
 
     def begin(self, context: BoundaryContext) -> None:
         """To be called before every subtask: forgets the last episode when a new one begins."""
@@ -80,8 +81,13 @@ class Intervention:
             self._resume_left = len(context.plan)
             if context.index == 0:
                 self._attempts.clear()
-                self._sought = self._looked = frozenset()
-        self._looked |= looked_into(context.graph, self._validator.domain)
+                self._sought = self._looked = self._over = frozenset()
+        domain = self._validator.domain
+        self._looked |= looked_into(context.graph, domain)
+        here: frozenset[str] = frozenset()
+        if context.executed and context.executed[-1][1] is SkillStatus.SUCCEEDED:
+            here = looked_over(context.graph, context.executed[-1][0], domain)
+        self._over = self._over | here if self._sought else here
 
     def repairs(self, context: BoundaryContext) -> bool:
         """Whether the subtask belongs to a repair, for which there is no demonstration."""
@@ -212,7 +218,7 @@ class Intervention:
         if not context.task.goal.literals and self._brought_about(context):
             why = f"what {context.subtask} is to bring about holds already"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
-        replan = self._replanner.replan(context, self._with_places(diagnosis))
+        replan = self._another_way(context, self._with_places(diagnosis))
         clock.lap("replan")
         if _is_the_old(replan.plan, context):  # what must change is nothing that planning knows of
             return self._no_plan(context, verdict, diagnosis, replan, clock)
@@ -231,25 +237,27 @@ class Intervention:
             )
         return self._no_plan(context, verdict, diagnosis, replan, clock)
 
+    def _another_way(self, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
+        """A plan without what came to nothing time and again; with it where there is no other."""
+        if context.vain:
+            barred = replace(context, refused=(*context.refused, *context.vain))
+            found = self._replanner.replan(barred, diagnosis)
+            if found.outcome is ReplanOutcome.SOLVED and not _is_the_old(found.plan, context):
+                return found
+        return self._replanner.replan(context, diagnosis)
+
     def _with_places(self, diagnosis: Diagnosis) -> Diagnosis:
         """A diagnosis with where the things that nobody sees are not: where one has looked."""
         lost = [x.args[0] for x in diagnosis.must_change if x.predicate == LOCATED]
         domain = self._validator.domain
-        empty = [f for name in lost for f in not_there(name, self._looked, domain)]
+        empty = [f for name in lost for f in not_there(name, self._looked | self._over, domain)]
         must_stay = tuple(dict.fromkeys((*diagnosis.must_stay, *empty)))
         return replace(diagnosis, must_stay=must_stay) if empty else diagnosis
 
     def _brought_about(self, context: BoundaryContext) -> bool:
         """Whether everything holds already that the subtask does whatever else is so."""
-        domain = self._validator.domain
-        names = domain.bound(context.subtask)
-        facts = [
-            f.bind(names)
-            for e in domain.skill(context.subtask.skill).effects
-            if not e.variables and e.condition == ALWAYS
-            for f in e.facts
-        ]
-        return bool(facts) and all(truth(context.graph, f, domain) is Truth.TRUE for f in facts)
+        seen = came_about(context.graph, context.subtask, self._validator.domain)
+        return seen is Truth.TRUE
 
     def _no_plan(
         self,

@@ -77,7 +77,8 @@ class ObjectNode:
     crop in the newest observation that saw it, as `types/feature.py` quantises it; which encoder
     stands in the record of the perception. `presumed` is what the skills that were carried out
     should have made of states that nobody has read since: plans take it as an assumption, nothing
-    else does.
+    else does. `unseen_m2` is how much of its surface, in square metres, no view has shown where
+    other things stand in between: who looks for a thing that nobody has seen goes there.
     """
 
     id: str
@@ -90,6 +91,7 @@ class ObjectNode:
     last_seen_s: float = 0.0
     feature: bytes | None = field(default=None, repr=False)
     presumed: tuple[tuple[str, str], ...] = ()
+    unseen_m2: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", tuple(sorted(self.states)))
@@ -293,6 +295,8 @@ def _node_json(node: ObjectNode, features: bool) -> dict[str, Any]:
         data["feature"] = base64.b64encode(node.feature).decode("ascii")
     if node.presumed:
         data["presumed"] = dict(node.presumed)
+    if node.unseen_m2:
+        data["unseen_m2"] = round(node.unseen_m2, 4)
     return data
 
 
@@ -303,6 +307,7 @@ def node_from(field: Field) -> ObjectNode:
         FileFormatError: a value that cannot be, with its place.
     """
     pixels, seen_s = field.optional("pixels", Field.whole), field.find("last_seen_s")
+    unseen_m2 = field.find("unseen_m2")
     return ObjectNode(
         id=field["id"].name(),
         category=field["category"].name(),
@@ -314,6 +319,7 @@ def node_from(field: Field) -> ObjectNode:
         last_seen_s=0.0 if seen_s is None else seen_s.number(),
         feature=field.optional("feature", _feature),
         presumed=field.optional("presumed", lambda f: f.pairs(Field.name)) or (),
+        unseen_m2=0.0 if unseen_m2 is None else unseen_m2.number(),
     )
 
 

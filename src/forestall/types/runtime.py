@@ -54,6 +54,8 @@ class BoundaryContext:
             plan it is the plan's length and `subtask` the last one.
         refused: ground subtasks that the robot refused, about whose arguments nothing has changed
             since; a plan that has one of them will be refused again.
+        vain: ground subtasks that were tried twice or more in a row and came to nothing each time:
+            as far as anybody sees, their effects did not come about. Another way is better.
         executed: what was tried so far, and how each subtask ended.
         said: what every judge said of this scene, where several are heard.
     """
@@ -72,6 +74,7 @@ class BoundaryContext:
     replans: int = 0
     when: When = When.BEFORE
     refused: tuple[Subtask, ...] = ()
+    vain: tuple[Subtask, ...] = ()
     executed: tuple[tuple[Subtask, SkillStatus], ...] = ()
     said: tuple[Verdict, ...] = ()
 

@@ -291,5 +291,5 @@ class Replan:
     expanded: int = 0  # search nodes
     seconds: float = 0.0
     note: str = ""
-    looking_for: tuple[str, ...] = ()  # the plan opens a place in which these may be
+    looking_for: tuple[str, ...] = ()  # the plan goes where these may be
     exchanges: tuple[Exchange, ...] = ()  # with a language model, in their order

@@ -1,0 +1,110 @@
+"""How much of a place's surface no picture has shown: there something may stand behind a thing.
+
+Called by `fuse.py`. The surface is a lattice of cells that stands still in the world; a cell is
+seen once a view's ray reaches a point close over it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from forestall.domain.looked import in_sight
+from forestall.domain.model import Domain
+from forestall.perception.config import PerceptionConfig
+from forestall.perception.support import CONTAINMENT
+from forestall.perception.tracks import Track, View
+from forestall.perception.unproject import Points, project
+
+Cells = npt.NDArray[np.int64]
+_FAR = 1 << 20
+
+
+def look_over(
+    tracks: Iterable[Track], views: Sequence[View], domain: Domain, config: PerceptionConfig
+) -> None:
+    """Note which cells of the places among some things the views of one observation show.
+
+    Args:
+        tracks: everything that is known; `shown` of open places grows.
+        views: of one observation.
+        domain: which of them are places, and how they take things.
+        config: thresholds.
+    """
+    for place in tracks:
+        if place.points_world_m is None or not in_sight(place.category, domain):
+            continue
+        cells = _cells(place, config).reshape(-1, 2)
+        cells = cells[~np.isin(_keys(cells), place.shown)]
+        if not len(cells):
+            continue
+        level_m = np.full(len(cells), _level_m(place, domain) + config.over_m)
+        seen = _seen(np.column_stack([(cells + 0.5) * config.cell_m, level_m]), views, config)
+        place.shown = np.union1d(place.shown, _keys(cells[seen]))
+
+
+def unseen_m2(
+    place: Track, tracks: Iterable[Track], domain: Domain, config: PerceptionConfig
+) -> float:
+    """Area in square metres that was never seen, in pieces on which a small thing has room.
+
+    Args:
+        place: 0 for what is no open place, or not located.
+        tracks: everything that is known: what is under a thing is not unseen.
+        domain: whether things stand on its top, or in it.
+        config: thresholds.
+    """
+    from scipy.ndimage import binary_opening
+
+    if place.points_world_m is None or not in_sight(place.category, domain):
+        return 0.0
+    lattice = _cells(place, config)
+    unseen = ~np.isin(_keys(lattice), place.shown)
+    if not unseen.any():
+        return 0.0
+    first, shape, level_m = lattice[0, 0], unseen.shape, _level_m(place, domain)
+    for other in tracks:
+        above = other.low_m[2] > place.high_m[2] + config.cell_m
+        if other is place or other.points_world_m is None or above or other.high_m[2] < level_m:
+            continue
+        a = np.rint(other.low_m[:2] / config.cell_m).astype(int) - first
+        b = np.rint(other.high_m[:2] / config.cell_m).astype(int) - first
+        (x0, y0), (x1, y1) = np.clip(a, 0, shape), np.clip(b, 0, shape)
+        unseen[x0:x1, y0:y1] = False
+    piece = np.ones((config.piece_cells, config.piece_cells), dtype=bool)
+    return float(np.count_nonzero(binary_opening(unseen, structure=piece))) * config.cell_m**2
+
+
+def _seen(points: Points, views: Sequence[View], config: PerceptionConfig) -> npt.NDArray[np.bool_]:
+    """Whether a ray of some view reaches each point, as far as depth tells."""
+    seen = np.zeros(len(points), dtype=bool)
+    for view in views:
+        frame = view.frame
+        column, row, z, inside = project(points, frame.intrinsics, frame.camera_to_world)
+        depth = frame.depth_m[row, column]
+        slack = np.maximum(config.free_margin_m, config.free_margin_share * z)
+        seen |= inside & (depth > 0) & (depth >= z - slack)
+    return seen
+
+
+def _level_m(place: Track, domain: Domain) -> float:
+    """How high the surface is on which things stand: the top, or the bottom that is seen."""
+    relation = domain.offers(place.category)
+    inside = relation is not None and domain.predicates[relation].geometry == CONTAINMENT
+    return float((place.low_m if inside else place.high_m)[2])
+
+
+def _cells(place: Track, config: PerceptionConfig) -> Cells:
+    """(nx, ny, 2) cells of the lattice whose middles lie over a place."""
+    a = np.ceil(place.low_m[:2] / config.cell_m - 0.5).astype(np.int64)
+    b = np.floor(place.high_m[:2] / config.cell_m - 0.5).astype(np.int64)
+    x, y = (np.arange(a[k], max(a[k], b[k]) + 1) for k in range(2))
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+
+
+def _keys(cells: Cells) -> Cells:
+    """One number for each cell."""
+    keys: Cells = cells[..., 0] * (2 * _FAR) + cells[..., 1] + _FAR
+    return keys
