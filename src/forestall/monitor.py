@@ -41,7 +41,8 @@ from forestall.types.verdict import Decision
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
-    from forestall.seams import Perceiver, Strategy
+    from forestall.seams.judging import Strategy
+    from forestall.seams.perceiving import Perceiver
 
 Scene = Observation | SceneGraph | Mapping[str, Any]
 """What a caller hands over to be judged."""

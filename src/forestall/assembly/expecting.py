@@ -21,7 +21,7 @@ from forestall.kinds import LLM
 from forestall.llm.answers import expected_fact
 from forestall.reading.documents import read_toml
 from forestall.reading.fields import Field
-from forestall.seams import Parts
+from forestall.seams.running import Parts
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Subtask
 

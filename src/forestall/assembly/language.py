@@ -17,7 +17,8 @@ from forestall.kinds import LLM, REASONER, REPLANNER, STORE, VALIDATOR
 from forestall.llm.client import ClientConfig, OpenAIModel
 from forestall.llm.recording import RecordingModel, ReplayingModel
 from forestall.replanning.model import ModelReplanner
-from forestall.seams import LanguageModel, Parts
+from forestall.seams.language import LanguageModel
+from forestall.seams.running import Parts
 from forestall.types.observation import Rgb
 from forestall.types.verdict import Reference
 

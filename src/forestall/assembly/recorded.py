@@ -29,7 +29,7 @@ from forestall.errors import (
 from forestall.files import replace_file
 from forestall.kinds import DOMAIN
 from forestall.memory.store import open_store
-from forestall.seams import DataSet
+from forestall.seams.others import DataSet
 from forestall.types.demonstration import Demonstration
 from forestall.types.foreign import ForeignRun
 from forestall.types.graph import SceneGraph

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from forestall.assembly.configuration import RunConfig
     from forestall.assembly.make import Prepared
-    from forestall.seams import Listener
+    from forestall.seams.running import Listener
     from forestall.types.demonstration import Demonstration
     from forestall.types.episode import EpisodeRecord
 

@@ -14,7 +14,7 @@ from forestall.cli.flags import SeeingFlags
 if TYPE_CHECKING:
     from forestall.assembly.recorded import Opened
     from forestall.experiments.recorded import JudgedRun
-    from forestall.seams import PlanSet
+    from forestall.seams.others import PlanSet
     from forestall.types.recorded import ReadReport, Unread
 
 DEFAULTS = SeeingFlags()

@@ -23,7 +23,7 @@ from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.exchanges import exchanges_of
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
-from forestall.seams import WorldPart
+from forestall.seams.acting import WorldPart
 from forestall.statistics.rows import (
     EXACT,
     KIND,

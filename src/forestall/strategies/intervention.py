@@ -14,7 +14,7 @@ from forestall.domain.formula import TRUE as ALWAYS
 from forestall.domain.looked import looked_into, not_there
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import truth
-from forestall.seams import PlanValidator, Replanner
+from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.types.facts import Literal, Truth
 from forestall.types.plan import Plan, Subtask, same_step

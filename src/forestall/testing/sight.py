@@ -12,7 +12,8 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import truth
 from forestall.planning.execute import Refusal, apply, resolve
 from forestall.planning.state import State
-from forestall.seams import Environment, Perceiver
+from forestall.seams.acting import Environment
+from forestall.seams.perceiving import Perceiver
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
