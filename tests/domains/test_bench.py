@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 from bench_scenes import BENCH, bench
 
-from forestall.domain.evaluate import TRUE, evaluate, solutions
+from forestall.domain.evaluate import evaluate, solutions
+from forestall.domain.view import TRUE
 from forestall.planning.execute import Refusal, apply, resolve
 from forestall.planning.state import State
 from forestall.types.episode import SkillStatus

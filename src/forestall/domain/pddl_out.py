@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from forestall.domain.evaluate import TRUE as HOLDS
-from forestall.domain.evaluate import View, by_number, evaluate, solutions, static_holds
+from forestall.domain.evaluate import evaluate, solutions, static_holds
 from forestall.domain.formula import (
     And,
     Every,
@@ -31,8 +30,10 @@ from forestall.domain.pddl_problem import types_of
 from forestall.domain.pddl_text import ROOT
 from forestall.domain.pddl_write import THING, Writer, without
 from forestall.domain.schema import Choice, Effect, PredicateKind, Skill
+from forestall.domain.view import TRUE as HOLDS
+from forestall.domain.view import View
 from forestall.errors import DomainError, UnknownNameError
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, by_number
 
 HAND = "hand"
 BEFORE = "before"

@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import by_number
 from forestall.domain.formula import (
     And,
     Every,
@@ -27,7 +26,7 @@ from forestall.planning.grounder import Universe, rigid_of
 from forestall.planning.needs import asks, conjuncts
 from forestall.planning.possible import Names, Possible, Way, possible
 from forestall.planning.state import State
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, by_number
 
 DEPTH = 9
 NEAR = 3

@@ -10,23 +10,22 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from itertools import product
 from typing import TypeVar
 
-from forestall.domain.evaluate import TRUE, by_number, literal_truth, number_of
+from forestall.domain.evaluate import literal_truth
 from forestall.domain.formula import Formula, Parameter
 from forestall.domain.model import FACING, LOCATED, Domain
 from forestall.domain.schema import Category, PredicateKind
+from forestall.domain.view import TRUE
 from forestall.planning.asked import Asked
 from forestall.planning.places import Place, crowded, places, positions
-from forestall.types.facts import Literal, category_of, is_instance
+from forestall.types.facts import Literal, by_number, category_of, is_instance
 from forestall.types.graph import SceneGraph
-
-__all__ = ["Place", "State", "by_number", "number_of"]
 
 Fact = tuple[str, ...]
 T = TypeVar("T")
 
 
 class State:
-    """What holds at one moment (implements `evaluate.View`, with two values only).
+    """What holds at one moment (implements `domain.view.View`, with two values only).
 
     `execute.apply` copies it and never changes the one it was given.
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from forestall.domain.evaluate import by_number
 from forestall.domain.model import Domain
 from forestall.domain.schema import PredicateKind
 from forestall.planning.execute import Refusal, apply, resolve
@@ -19,7 +18,7 @@ from forestall.planning.settle import settle
 from forestall.planning.state import State
 from forestall.testing.symbolic_scene import relation_at, start_scene
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, by_number
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.observation import GripperState, Observation, Vec3
 from forestall.types.plan import Subtask
