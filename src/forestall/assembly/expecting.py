@@ -1,6 +1,6 @@
 """Factory of what a language model expects, and the file that keeps what it said.
 
-Named in `registry`, called through `parts`; calls diagnosis and comparison. The file stands beside
+Named in `tables`, called through `parts`; calls diagnosis and comparison. The file stands beside
 the memory or wherever it is told to: people read it, and may take out what is wrong. It is
 evidence of its own: recording, mining and counting of demonstrations never read it.
 """

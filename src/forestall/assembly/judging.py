@@ -1,6 +1,6 @@
 """Factories of what remembers, judges, explains and corrects.
 
-Named in `registry`, called through `parts`; calls memory, comparison, detection, diagnosis,
+Named in `tables`, called through `parts`; calls memory, comparison, detection, diagnosis,
 replanning, planning, strategies.
 """
 

@@ -1,6 +1,6 @@
 """Factories of what a language model does, and what `--llm` says.
 
-Named in `registry`, called through `parts`; calls llm, diagnosis, replanning. Reasoner and
+Named in `tables`, called through `parts`; calls llm, diagnosis, replanning. Reasoner and
 replanner of a model have the plain ones behind them, which answer where the model does not.
 """
 

@@ -1,6 +1,6 @@
 """Factories of what sees: segmenters, state estimators, the perceiver, the captioner that lists.
 
-Named in `registry`, called through `parts`; calls perception and embeddings.
+Named in `tables`, called through `parts`; calls perception and embeddings.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Factory of the strategy that watches: every judge there is, beside one another.
 
-Named in `registry`, called through `parts`; calls `judging` for what one part alone does not tell.
+Named in `tables`, called through `parts`; calls `judging` for what one part alone does not tell.
 """
 
 from __future__ import annotations

@@ -19,7 +19,8 @@ def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
             expectations, llm, reasoner, replanner, validator, limit, strategy.
         as_json: print JSON, always with options.
     """
-    from forestall.assembly.registry import TABLES, known, lacking, table
+    from forestall.assembly.registry import known, lacking, table
+    from forestall.assembly.tables import TABLES
     from forestall.extras import how
 
     if not as_json and kind is None:
