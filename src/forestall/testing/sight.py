@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from forestall.domain.model import Domain
 from forestall.domain.truth import truth
 from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
 from forestall.seams.acting import Environment
 from forestall.seams.perceiving import Perceiver
@@ -39,7 +40,7 @@ def unseen(
         for name in subtask.args:
             environment.approach(name)
         graph = perceiver.perceive(environment.observe(_points(graph, subtask)))
-        before = State.from_graph(graph, domain)
+        before = state_of(graph, domain)
         outcome = environment.execute(subtask)
         done = outcome.status is SkillStatus.SUCCEEDED
         acted = getattr(perceiver, "acted", None)

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from forestall.domain.model import Domain
 from forestall.domain.schema import PredicateKind
 from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.observed import state_of
 from forestall.planning.settle import settle
 from forestall.planning.state import State
 from forestall.testing.symbolic_scene import relation_at, start_scene
@@ -54,7 +55,7 @@ class SymbolicWorld:
         """Put the world into the start state of this seed."""
         start = self._start
         graph = start_scene(self._domain, start, seed) if isinstance(start, SceneNeeds) else start
-        self._state = State.from_graph(graph, self._domain)
+        self._state = state_of(graph, self._domain)
         self._state.hidden = frozenset()
         fixtures = [n for n in self._state.kinds if self._is_fixture(n)]
         order = sorted(fixtures, key=by_number)
