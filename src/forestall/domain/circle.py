@@ -58,7 +58,7 @@ class Circle:
         self.depth += 1
         try:
             truth = self.now[key] = self.work_out(known, args)
-        except BaseException:
+        except BaseException:  # an interrupt, too, leaves nothing half worked out
             del self.now[key]
             raise
         finally:

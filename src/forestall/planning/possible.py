@@ -146,7 +146,7 @@ class Possible(Grounder):
         self._steps += 1
         try:
             yield
-        except BaseException:
+        except BaseException:  # an interrupt, too, leaves nothing half worked out
             del known[key]
             raise
         finally:
@@ -256,7 +256,7 @@ def possible(state: State, made: Made, deadline: Deadline | None = None) -> Iter
     found.state, found.deadline = state, deadline
     try:
         yield found
-    except BaseException:
+    except BaseException:  # an interrupt, too, leaves nothing half worked out
         recent.pop(key, None)
         raise
     finally:
