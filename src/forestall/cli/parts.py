@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
 
-from cyclopts import Parameter
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
+from forestall.cli.flags import Json
 
 
 def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
