@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from forestall.assembly.registry import NEEDS, TABLES, lacking
+from forestall.assembly.registry import lacking
+from forestall.assembly.tables import NEEDS, TABLES
 from forestall.errors import InputError
 from forestall.extras import EXTRAS, how, installed, missed, need, present
 from stranger import INSERT

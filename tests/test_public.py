@@ -8,12 +8,14 @@ import subprocess
 import sys
 import typing
 from enum import Enum
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 import pytest
 
 import forestall
-from forestall import InputError, Monitor, MonitorConfig, Outcome, Subtask
+from forestall import InputError, Monitor, MonitorConfig, Outcome, Subtask, seams
 from stranger import GRASP, INSERT, TWELVE, UNSCREW, scene
 
 MONITOR = Monitor.from_demonstrations(TWELVE)
@@ -197,3 +199,15 @@ def test_importing_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "forestall.assembly" not in done.stdout
+
+
+def test_every_protocol_of_the_seams_can_be_had_from_the_package() -> None:
+    modules = [import_module(f"forestall.seams.{m.name}") for m in iter_modules(seams.__path__)]
+    defined = {
+        name
+        for module in modules
+        for name, value in vars(module).items()
+        if getattr(value, "_is_protocol", False) and value.__module__ == module.__name__
+    }
+    assert len(defined) > 30
+    assert defined == set(seams.__all__)

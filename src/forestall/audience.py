@@ -12,7 +12,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from forestall.seams import Listener
+from forestall.seams.running import Listener
 from forestall.supervision import in_words
 
 _Said = tuple[str, tuple[Any, ...]]

@@ -141,3 +141,14 @@ class PartError(ForestallError):
 
 def _part_error(part: str, why: str, late: bool, internal: bool, world: bool) -> PartError:
     return PartError(part, why, late=late, internal=internal, world=world)
+
+
+def where(error: BaseException) -> str:
+    """Where in the program an error came up, " (file.py, line 7)"; "" for one never raised."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None:
+        return ""
+    file = place.tb_frame.f_code.co_filename.replace("\\", "/").rpartition("/")[2]
+    return f" ({file}, line {place.tb_lineno})"

@@ -38,7 +38,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(partial, path)
-        except BaseException:
+        except BaseException:  # an interrupt, too, leaves no half file
             partial.unlink(missing_ok=True)
             raise
 

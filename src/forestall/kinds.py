@@ -7,26 +7,27 @@ for other parts by kind.
 from __future__ import annotations
 
 from forestall.domain.model import Domain
-from forestall.seams import (
-    Captioner,
+from forestall.seams.acting import Eye, WorldPart
+from forestall.seams.judging import (
     DemonstrationStore,
     Detector,
     Expectations,
-    Eye,
-    Finder,
-    ImageTextEncoder,
-    LanguageModel,
-    Outliner,
-    Perceiver,
     PlanValidator,
     Reasoner,
     Replanner,
     Retriever,
+    Strategy,
+)
+from forestall.seams.language import LanguageModel
+from forestall.seams.perceiving import (
+    Captioner,
+    Finder,
+    ImageTextEncoder,
+    Outliner,
+    Perceiver,
     Segmenter,
     StateEstimator,
-    Strategy,
     TextEncoder,
-    WorldPart,
 )
 from forestall.supervision import Limits
 from forestall.types.kind import Kind

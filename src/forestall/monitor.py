@@ -16,13 +16,14 @@ A scene is an observation (RGB-D), a scene graph, or one in its short form (`typ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from forestall.conclusion import MonitorConfig
 from forestall.errors import InputError, PartError, UnknownNameError
+from forestall.handed import Scene, outcome_of, scene_of, subtask_of, task_of
 from forestall.moments import Moments
 from forestall.run_state import RunState
 from forestall.senses import Senses
@@ -34,24 +35,13 @@ from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer, When
-from forestall.types.scene import SceneNeeds
-from forestall.types.symbolic import scene_graph
-from forestall.types.task import Goal, Task
+from forestall.types.task import Task
 from forestall.types.verdict import Decision
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
-    from forestall.seams import Perceiver, Strategy
-
-Scene = Observation | SceneGraph | Mapping[str, Any]
-"""What a caller hands over to be judged."""
-
-ENDED = {
-    "done": SkillStatus.SUCCEEDED,
-    "failed": SkillStatus.FAILED,
-    "refused": SkillStatus.REFUSED,
-}
-"""How a subtask may have ended, in a caller's words."""
+    from forestall.seams.judging import Strategy
+    from forestall.seams.perceiving import Perceiver
 
 
 class Monitor:
@@ -101,12 +91,7 @@ class Monitor:
         Raises:
             PartError: the perceiver cannot be reset, or has not come back from an earlier run.
         """
-        if isinstance(task, Sequence) and not isinstance(task, str):
-            task = Plan(tuple(_subtask(s) for s in task))
-        if not isinstance(task, Task | Plan):
-            raise InputError(f"a task, a plan or a list of subtasks is needed, not {task!r}")
-        if isinstance(task, Plan):
-            task = Task(task.goal, task.goal, Goal(task.goal), task, SceneNeeds())
+        task = task_of(task)
         first = task.plan if plan is None else plan
         self._state = RunState(
             task, first, self._domain, first, Senses(self._config.limits.max_unchanged)
@@ -127,7 +112,7 @@ class Monitor:
         Raises:
             InputError: the subtask's arguments do not fit, or the scene cannot be read.
         """
-        wanted = _subtask(subtask)
+        wanted = subtask_of(subtask)
         if wanted.skill in self._domain.skills:
             self._domain.check(wanted)
         try:
@@ -192,7 +177,7 @@ class Monitor:
             InputError: nothing was judged before, or there is no such outcome.
         """
         run = self._run
-        outcome = _ended(outcome, reason)
+        outcome = outcome_of(outcome, reason)
         if self._awaited is None:
             run.note_executed(outcome)
             run.mark()
@@ -383,31 +368,7 @@ class Monitor:
 
     def _read(self, scene: Scene) -> Observation | SceneGraph:
         """What can be judged; raises InputError where it is neither a picture nor a scene."""
-        if isinstance(scene, Mapping):
-            return scene_graph(scene)
-        if not isinstance(scene, SceneGraph | Observation):
-            raise InputError(
-                f"a scene is a mapping, a scene graph or an observation, not {type(scene).__name__}"
-            )
-        if not isinstance(scene, SceneGraph) and not self._parts.perceives:
-            raise InputError("this monitor has no perceiver: give it a scene graph")
-        return scene
-
-
-def _subtask(said: Subtask | str) -> Subtask:
-    if isinstance(said, str):
-        return Subtask.parse(said)
-    if not isinstance(said, Subtask):
-        raise InputError(f"a subtask is a text, skill(thing, place), not {said!r}")
-    return said
-
-
-def _ended(outcome: SkillOutcome | str, reason: str) -> SkillOutcome:
-    if isinstance(outcome, SkillOutcome):
-        return outcome
-    if outcome not in ENDED:
-        raise UnknownNameError("outcome of a subtask", str(outcome), ENDED)
-    return SkillOutcome(ENDED[outcome], 0.0, reason)
+        return scene_of(scene, self._parts.perceives)
 
 
 def _whole(graph: SceneGraph, subtask: Subtask) -> SceneGraph:

@@ -18,7 +18,7 @@ from forestall.conclusion import MonitorConfig
 from forestall.errors import PartError
 from forestall.monitor import Monitor
 from forestall.records.plain import plain
-from forestall.seams import LookListener
+from forestall.seams.running import LookListener
 from forestall.supervised import SupervisedWorld, described
 from forestall.supervision import Limits, Supervisor, part_error
 from forestall.types.decision import Hold, MonitorDecision, Outcome
@@ -36,7 +36,10 @@ from forestall.types.task import Task
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
-    from forestall.seams import Environment, Listener, Perceiver, Strategy
+    from forestall.seams.acting import Environment
+    from forestall.seams.judging import Strategy
+    from forestall.seams.perceiving import Perceiver
+    from forestall.seams.running import Listener
 
 Score = Callable[[EpisodeRecord], EpisodeRecord]
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from forestall.errors import ForestallError, ObservationError, PartError
-from forestall.seams import Unnamed
+from forestall.seams.acting import Unnamed
 from forestall.supervision import Supervisor, checked_answer
 from forestall.types.episode import SkillOutcome
 from forestall.types.graph import SceneGraph
@@ -23,7 +23,9 @@ from forestall.types.verdict import Decision, Diagnosis, Replan, Verdict
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
-    from forestall.seams import Environment, Perceiver, Strategy
+    from forestall.seams.acting import Environment
+    from forestall.seams.judging import Strategy
+    from forestall.seams.perceiving import Perceiver
 
 Where = Mapping[str, Vec3 | None]
 Scope = Callable[[SceneGraph, Subtask], SceneGraph]

@@ -303,7 +303,7 @@ def doing(part: str, limit: str) -> Iterator[None]:
     job.begin(part, job.limits.of(limit))
     try:
         yield
-    except BaseException as error:
+    except BaseException as error:  # a part that exits has failed, too; only whose it is is noted
         if job.failed is None or job.failed[0] is not error:
             job.failed = (error, part)
         raise

@@ -15,7 +15,8 @@ from forestall.assembly import registry
 from forestall.assembly.configuration import Given, choices, run_config
 from forestall.assembly.options import declared
 from forestall.assembly.parts import Assembly
-from forestall.assembly.registry import TABLES, default, find, known
+from forestall.assembly.registry import default, find, known
+from forestall.assembly.tables import TABLES, Table
 from forestall.domain.load import shipped
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import DETECTOR, SEGMENTER
@@ -131,7 +132,7 @@ def test_options_of_others_are_checked_like_ours(plugin: None) -> None:
 
 
 def test_one_ours_that_cannot_be_imported_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = registry.Table(SEGMENTER, "torn", {"torn": "forestall.absent:Segmenter"})
+    table = Table(SEGMENTER, "torn", {"torn": "forestall.absent:Segmenter"})
     monkeypatch.setitem(TABLES, "segmenter", table)
     with pytest.raises(InputError, match=r"segmenter 'torn' cannot be loaded \(forestall.absent"):
         find("segmenter", "torn")

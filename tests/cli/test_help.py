@@ -10,7 +10,7 @@ import pytest
 from cyclopts import App
 
 from forestall.assembly.configuration import WITHOUT
-from forestall.assembly.registry import DATA_SETS, FOREIGN, TABLES
+from forestall.assembly.tables import DATA_SETS, FOREIGN, TABLES
 from forestall.cli.app import app
 from forestall.cli.examples import EXAMPLES
 from forestall.cli.main import call

@@ -12,7 +12,8 @@ from pddl_corpus import FOLDER, NAMES, execute, problem, read_plan, subtask
 
 from forestall.domain.formula import parse_formula
 from forestall.domain.load import shipped
-from forestall.domain.pddl_out import domain_pddl, problem_pddl
+from forestall.domain.pddl_out import domain_pddl
+from forestall.domain.pddl_state import problem_pddl
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.state import State
 

@@ -12,7 +12,8 @@ from pddl_corpus import subtask
 from forestall.domain.formula import TRUE
 from forestall.domain.load import shipped
 from forestall.domain.pddl_in import read_pddl
-from forestall.domain.pddl_out import domain_pddl, problem_pddl
+from forestall.domain.pddl_out import domain_pddl
+from forestall.domain.pddl_state import problem_pddl
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.pddl_problem import read_problem
 from forestall.planning.state import State

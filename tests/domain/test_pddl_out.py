@@ -7,7 +7,8 @@ from pddl_corpus import FOLDER, NAMES, problem
 
 from forestall.domain.load import load_domain, shipped
 from forestall.domain.pddl_in import read_pddl
-from forestall.domain.pddl_out import domain_pddl, problem_pddl
+from forestall.domain.pddl_out import domain_pddl
+from forestall.domain.pddl_state import problem_pddl
 from forestall.errors import DomainError
 from forestall.planning.pddl_problem import read_problem
 

@@ -6,8 +6,8 @@ import pytest
 
 from forestall.domain.load import load_domain
 from forestall.domain.model import Domain
+from forestall.planning.observed import state_of
 from forestall.planning.planner import plan_goal
-from forestall.planning.state import State
 from forestall.testing.symbolic_world import SymbolicWorld
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal
@@ -54,7 +54,7 @@ def world(household: Domain) -> SymbolicWorld:
 
 
 def test_wiping_is_planned(household: Domain, world: SymbolicWorld) -> None:
-    state = State.from_graph(world.truth(), household)
+    state = state_of(world.truth(), household)
     goal = Goal("the plate is clean", literals=(Literal.parse("dirty(Plate-1)=clean"),))
     planned = plan_goal(state, goal)
     assert planned.outcome is ReplanOutcome.SOLVED

@@ -5,8 +5,10 @@ from typing import Any
 import pytest
 from bench_scenes import BENCH, bench
 
-from forestall.domain.evaluate import TRUE, evaluate, solutions
+from forestall.domain.evaluate import evaluate, solutions
+from forestall.domain.view import TRUE
 from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal
@@ -165,7 +167,7 @@ DONE = [
 
 
 def _state(*specs: str, **kwargs: Any) -> State:
-    return State.from_graph(bench(*specs, **kwargs).truth(), BENCH)
+    return state_of(bench(*specs, **kwargs).truth(), BENCH)
 
 
 @pytest.mark.parametrize(("step", "words", "scene"), REFUSED)

@@ -15,8 +15,8 @@ from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.memory.store import open_store
 from forestall.planning.goals import alternatives
+from forestall.planning.observed import state_of
 from forestall.planning.planner import plan_goal, plan_to
-from forestall.planning.state import State
 from forestall.records.record import read_record, write_record
 from forestall.report.page import page_html
 from forestall.tasks.files import load_scenario, load_task, scenario_names, task_names
@@ -140,14 +140,14 @@ def test_a_plan_knows_what_its_needs_stand_on_and_leaves_the_floor_alone() -> No
     """The arm and its jaws are no part of the goal, and every step needs them."""
     loaded = load_task("glue-peg")
     graph = start_scene(loaded.domain, loaded.task.scene, 3)
-    planned = plan_goal(State.from_graph(graph, loaded.domain), loaded.task.goal)
+    planned = plan_goal(state_of(graph, loaded.domain), loaded.task.goal)
     assert planned.outcome is ReplanOutcome.SOLVED
     assert not any("Floor" in a for step in planned.subtasks for a in step.args)
 
 
 def test_tools_are_changed_in_a_narrowed_problem() -> None:
     loaded = load_task("fasten-plate")
-    state = State.from_graph(start_scene(loaded.domain, loaded.task.scene, 3), loaded.domain)
+    state = state_of(start_scene(loaded.domain, loaded.task.scene, 3), loaded.domain)
     goals = alternatives(state, loaded.task.goal)
     planned = plan_to(state, goals, widen=False)
     assert planned.outcome is ReplanOutcome.SOLVED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -52,6 +53,17 @@ class Sleeping(Faulty):
     instead = staticmethod(_sleeps)
 
 
+class Unopened(Faulty):
+    """There is no scene to begin with."""
+
+    @contextmanager
+    def open(
+        self, needs: SceneNeeds, domain: Domain, remember: bool = False
+    ) -> Iterator[OpenSymbolicWorld]:
+        raise ZeroDivisionError("no scene")
+        yield
+
+
 class Refusing(Faulty):
     """It refuses everything."""
 
@@ -74,6 +86,14 @@ def test_a_world_that_breaks_is_a_broken_episode() -> None:
     )
     metrics = outcome_metrics([row])
     assert metrics["errors"].count == 1 and metrics["held"].count == 0
+
+
+def test_what_breaks_before_a_run_is_a_row_that_says_where() -> None:
+    row = row_of("Unopened")
+    assert row.end == "error"
+    assert re.fullmatch(r"ZeroDivisionError: no scene \(test_held\.py, line \d+\)", row.error), (
+        row.error
+    )
 
 
 def test_a_world_that_sleeps_is_a_held_episode() -> None:

@@ -10,7 +10,7 @@ from forestall.domain.toml_out import domain_toml
 from forestall.errors import InputError
 from forestall.learning.learn import learn
 from forestall.planning.execute import Refusal, apply
-from forestall.planning.state import State
+from forestall.planning.observed import state_of
 from forestall.types.plan import Subtask
 from forestall.types.symbolic import scene_graph
 from stranger import TWELVE, scene
@@ -66,7 +66,7 @@ def test_what_a_relation_is_for_follows_from_its_use() -> None:
 
 
 def test_the_learnt_skills_run() -> None:
-    state = State.from_graph(scene_graph(scene()), DOMAIN)
+    state = state_of(scene_graph(scene()), DOMAIN)
     for text in ("grasp(peg-1)", "insert(peg-1, hole-1, driver-1)"):
         after = apply(state, Subtask.parse(text))
         assert not isinstance(after, Refusal), after

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from log_samples import STEPS, Run, run, write
 
-from forestall.assembly.registry import LOGS, data_set, log
+from forestall.assembly.registry import data_set, log
+from forestall.assembly.tables import LOGS
 from forestall.domain.load import shipped
 from forestall.errors import InputError
 from forestall.logs.outlines import detections_of

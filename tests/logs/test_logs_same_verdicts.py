@@ -12,8 +12,8 @@ from small_kitchens import logged
 from forestall.assembly.checking import Judgements, Question, judge_stored
 from forestall.assembly.configuration import Given
 from forestall.assembly.recorded import import_into, open_data
-from forestall.assembly.registry import LOGS
 from forestall.assembly.replaying import replay, runs_of
+from forestall.assembly.tables import LOGS
 from forestall.memory.recording import demonstration_from
 from forestall.memory.store import open_store
 from forestall.types.decision import Outcome

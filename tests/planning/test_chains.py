@@ -6,8 +6,9 @@ import sys
 
 import pytest
 
-from forestall.domain.evaluate import FALSE, TRUE, literal_truth
+from forestall.domain.evaluate import literal_truth
 from forestall.domain.load import read_domain
+from forestall.domain.view import FALSE, TRUE
 from forestall.planning.planner import plan_goal
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State

@@ -7,6 +7,7 @@ from lost_runs import lost, run
 
 from forestall.domain.formula import normal
 from forestall.domain.load import shipped
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
 from forestall.tasks.causes import causes
 from forestall.tasks.fault_facts import fault_facts
@@ -88,7 +89,7 @@ def kitchen(*relations: Relation, door: str = "open") -> State:
         ObjectNode("Fridge-1", "Fridge", (("open", door),)),
         ObjectNode("Microwave-1", "Microwave", (("open", "open"),)),
     )
-    return State.from_graph(SceneGraph(nodes, relations), HOUSEHOLD)
+    return state_of(SceneGraph(nodes, relations), HOUSEHOLD)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks
 from forestall.planning.execute import apply
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
 from forestall.planning.validate import GraphValidator
 from forestall.tasks.files import LoadedTask, load_task
@@ -160,7 +161,7 @@ def test_planning_takes_it_as_a_fact_that_no_skill_changes(loaded: LoadedTask) -
         check = GraphValidator(loaded.domain).check(loaded.task.plan, graph, loaded.task.goal)
         assert check.ok is ok
         assert [str(x) for x in check.unmet] == ([] if ok else ["ripe(Tomato-1)=ripe"])
-        state: object = State.from_graph(graph, loaded.domain)
+        state: object = state_of(graph, loaded.domain)
         for step in ("pick_up(Knife)", "slice_obj(Tomato)"):
             assert isinstance(state, State)
             state = apply(state, Subtask.parse(step))

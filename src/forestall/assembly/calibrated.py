@@ -16,7 +16,7 @@ from forestall.calibration.file import read_calibration
 from forestall.calibration.fitted import CalibrationTable, JudgeThresholds
 from forestall.errors import InputError
 from forestall.kinds import RETRIEVER, TEXT_ENCODER
-from forestall.seams import Parts
+from forestall.seams.running import Parts
 from forestall.types.demonstration import Demonstration
 
 SET_BY_SCORE = "threshold"

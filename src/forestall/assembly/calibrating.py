@@ -34,7 +34,7 @@ from forestall.learning.learn import learn
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
 from forestall.planning.validate import GraphValidator
-from forestall.seams import Retriever
+from forestall.seams.judging import Retriever
 from forestall.strategies.plan_check import PlanChecking
 from forestall.tasks.files import load_task
 from forestall.types.demonstration import Demonstration

@@ -29,7 +29,7 @@ from forestall.domain.words import Names
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import PERCEIVER, STATES, STRATEGY
 from forestall.monitor import Monitor
-from forestall.seams import Strategy
+from forestall.seams.judging import Strategy
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import (

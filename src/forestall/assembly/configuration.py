@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from forestall.assembly.options import built, checked, plain
-from forestall.assembly.registry import TABLES, find, table
+from forestall.assembly.registry import find, table
+from forestall.assembly.tables import TABLES
 from forestall.domain.model import Domain
 from forestall.domain.toml_out import domain_toml
 from forestall.errors import FileFormatError, InputError, UnknownNameError

@@ -24,7 +24,7 @@ from forestall.files import replace_file
 from forestall.kinds import DETECTOR, REASONER, STORE
 from forestall.reading.documents import read_toml
 from forestall.reading.fields import Field
-from forestall.seams import Parts
+from forestall.seams.running import Parts
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Subtask
 

@@ -1,6 +1,6 @@
 """Factory of what a language model expects, and the file that keeps what it said.
 
-Named in `registry`, called through `parts`; calls diagnosis and comparison. The file stands beside
+Named in `tables`, called through `parts`; calls diagnosis and comparison. The file stands beside
 the memory or wherever it is told to: people read it, and may take out what is wrong. It is
 evidence of its own: recording, mining and counting of demonstrations never read it.
 """
@@ -21,7 +21,7 @@ from forestall.kinds import LLM
 from forestall.llm.answers import expected_fact
 from forestall.reading.documents import read_toml
 from forestall.reading.fields import Field
-from forestall.seams import Parts
+from forestall.seams.running import Parts
 from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Subtask
 

@@ -18,7 +18,7 @@ from forestall.kinds import DOMAIN, PERCEIVER
 from forestall.perception.folder import read_observation
 from forestall.perception.scene_dict import scene_from_dict
 from forestall.perception.scenes import Scenes
-from forestall.seams import Perceiver
+from forestall.seams.perceiving import Perceiver
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Subtask

@@ -24,7 +24,8 @@ from types import TracebackType
 from forestall.audience import Audience
 from forestall.errors import InputError
 from forestall.files import alone, make_folder
-from forestall.monitor import Monitor, Scene
+from forestall.handed import Scene
+from forestall.monitor import Monitor
 from forestall.records.record import RunRecorder
 from forestall.types.decision import MonitorDecision
 from forestall.types.episode import BoundaryRecord, EpisodeEnd, EpisodeRecord, SkillOutcome

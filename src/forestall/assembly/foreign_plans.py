@@ -19,7 +19,7 @@ from forestall.domain.toml_out import domain_toml
 from forestall.errors import ForestallError, InputError
 from forestall.files import replace_file
 from forestall.planning.rehearse import PlanOutcome, Rehearsal, rehearse
-from forestall.seams import PlanSet
+from forestall.seams.others import PlanSet
 from forestall.testing.symbolic_scene import start_scene
 from forestall.types.foreign import ForeignPlan
 from forestall.types.graph import SceneGraph

@@ -1,6 +1,6 @@
 """Factories of what remembers, judges, explains and corrects.
 
-Named in `registry`, called through `parts`; calls memory, comparison, detection, diagnosis,
+Named in `tables`, called through `parts`; calls memory, comparison, detection, diagnosis,
 replanning, planning, strategies.
 """
 
@@ -54,7 +54,8 @@ from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.anew import GoalReplanner
 from forestall.replanning.symbolic import PlannerReplanner
-from forestall.seams import Locator, Parts, PlanValidator
+from forestall.seams.judging import Locator, PlanValidator
+from forestall.seams.running import Parts
 from forestall.strategies.judges import DetectorJudge
 from forestall.strategies.online import Online, OnlineScene
 from forestall.strategies.panel import Agree, Panel

@@ -22,7 +22,7 @@ from forestall.errors import InputError, MemoryFileError, PerceptionError
 from forestall.kinds import DOMAIN, PERCEIVER
 from forestall.memory.store import open_store
 from forestall.perception.folder import read_observation, write_observation
-from forestall.seams import Perceiver
+from forestall.seams.perceiving import Perceiver
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation, Rgb

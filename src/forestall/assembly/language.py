@@ -1,6 +1,6 @@
 """Factories of what a language model does, and what `--llm` says.
 
-Named in `registry`, called through `parts`; calls llm, diagnosis, replanning. Reasoner and
+Named in `tables`, called through `parts`; calls llm, diagnosis, replanning. Reasoner and
 replanner of a model have the plain ones behind them, which answer where the model does not.
 """
 
@@ -17,7 +17,8 @@ from forestall.kinds import LLM, REASONER, REPLANNER, STORE, VALIDATOR
 from forestall.llm.client import ClientConfig, OpenAIModel
 from forestall.llm.recording import RecordingModel, ReplayingModel
 from forestall.replanning.model import ModelReplanner
-from forestall.seams import LanguageModel, Parts
+from forestall.seams.language import LanguageModel
+from forestall.seams.running import Parts
 from forestall.types.observation import Rgb
 from forestall.types.verdict import Reference
 

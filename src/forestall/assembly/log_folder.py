@@ -1,7 +1,7 @@
 """A run as a folder of stored observations: written from a run, and read as a recorded one.
 
 The simplest log: looks in the format of docs/observation-format.md, numbered, and `run.json` with
-what was carried out between them. Named by `registry`; calls perception's reader and writer, and
+what was carried out between them. Named by `tables`; calls perception's reader and writer, and
 `logs` for what every log says.
 """
 

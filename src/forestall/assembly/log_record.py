@@ -1,7 +1,7 @@
 """The record of a run as a recorded run: its scene graphs are what was seen (`seams.DataSet`).
 
 A record keeps pictures small and no depth, so that nothing can be perceived anew: the graphs are
-handed on as they were believed. Named by `registry`; calls `records`.
+handed on as they were believed. Named by `tables`; calls `records`.
 """
 
 from __future__ import annotations

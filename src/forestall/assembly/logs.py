@@ -1,6 +1,6 @@
 """Logs by name: what writes one while a run goes on.
 
-Called by `forestall run --log`; calls the writers of `registry.LOGS`. Reading them is
+Called by `forestall run --log`; calls the writers of `tables.LOGS`. Reading them is
 `recorded.open_data`'s.
 """
 
@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from forestall.assembly.registry import LOGS, log
+from forestall.assembly.registry import log
+from forestall.assembly.tables import LOGS
 from forestall.errors import InputError
 from forestall.logs.writing import EpisodeLog
 

@@ -25,7 +25,9 @@ from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.kinds import LIMIT, PERCEIVER, SEGMENTER, SENSOR, STATES, STRATEGY, WORLD
 from forestall.runtime import Runtime, RuntimeConfig
-from forestall.seams import Environment, Listener, OpenWorld, OracleView, Strategy, WorldPart
+from forestall.seams.acting import Environment, OpenWorld, OracleView, WorldPart
+from forestall.seams.judging import Strategy
+from forestall.seams.running import Listener
 from forestall.tasks.edge import WorldsEdge, named
 from forestall.tasks.faults import (
     Fault,

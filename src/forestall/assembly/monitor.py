@@ -18,10 +18,10 @@ from forestall.assembly.sources import MEMORY_SUFFIXES, Source, demonstrations_f
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
 from forestall.domain.words import Words
+from forestall.handed import Scene
 from forestall.kinds import DOMAIN, LIMIT, PERCEIVER, STRATEGY
 from forestall.learning.learn import learn
 from forestall.monitor import Monitor as RunMonitor
-from forestall.monitor import Scene
 from forestall.perception.scene_dict import scene_from_dict
 from forestall.perception.scenes import Scenes
 from forestall.types.decision import MonitorDecision

@@ -12,7 +12,7 @@ from typing import Any
 from forestall.assembly.configuration import run_config
 from forestall.assembly.make import make_environment, make_world, prepare
 from forestall.domain.model import Domain
-from forestall.seams import Environment
+from forestall.seams.acting import Environment
 from forestall.tasks.faults import apply_scene_faults
 from forestall.tasks.goals import TruthGoalChecker, irreversible
 from forestall.types.graph import SceneGraph

@@ -153,7 +153,7 @@ def built(found: Found, given: Mapping[str, Any], parts: Any) -> Any:
         return found.factory(*first, **arguments)
     except ForestallError:
         raise
-    except Exception as error:
+    except Exception as error:  # somebody else's code: whatever breaks is told with its package
         if found.package is None:
             raise
         raise InputError(

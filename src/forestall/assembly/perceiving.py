@@ -82,7 +82,7 @@ def perceive_stored(path: Path, out: Path, given: Given) -> tuple[list[Perceived
                 graph, masks = eyes.see(scene, partial / place)
                 seen.append(Perceived(scene, out / place, graph, masks))
             partial.rename(out)
-    except BaseException:
+    except BaseException:  # an interrupt, too, leaves no half folder
         shutil.rmtree(partial, ignore_errors=True)
         raise
     return seen, eyes.described

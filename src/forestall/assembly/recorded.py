@@ -17,7 +17,8 @@ from typing import Any
 import forestall
 from forestall.assembly.configuration import Given
 from forestall.assembly.eyes import Eyes, eyes_for, of_stored
-from forestall.assembly.registry import DATA_SETS, data_set
+from forestall.assembly.registry import data_set
+from forestall.assembly.tables import DATA_SETS
 from forestall.domain.model import Domain
 from forestall.errors import (
     FileFormatError,
@@ -29,7 +30,7 @@ from forestall.errors import (
 from forestall.files import replace_file
 from forestall.kinds import DOMAIN
 from forestall.memory.store import open_store
-from forestall.seams import DataSet
+from forestall.seams.others import DataSet
 from forestall.types.demonstration import Demonstration
 from forestall.types.foreign import ForeignRun
 from forestall.types.graph import SceneGraph

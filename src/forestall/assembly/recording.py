@@ -255,7 +255,7 @@ def _recorded_now(
                 "a process that recorded has died (killed, or out of memory): what was finished "
                 "is kept; run the same command again to go on"
             ) from error
-        except BaseException:
+        except BaseException:  # an interrupt, too, ends what is still waiting
             hands.shutdown(wait=False, cancel_futures=True)
             raise
 

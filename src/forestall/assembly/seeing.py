@@ -1,6 +1,6 @@
 """Factories of what sees: segmenters, state estimators, the perceiver, the captioner that lists.
 
-Named in `registry`, called through `parts`; calls perception and embeddings.
+Named in `tables`, called through `parts`; calls perception and embeddings.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from forestall.perception.oracle import OracleStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import GivenMasks, InstanceSegmenter
 from forestall.planning.altered import altered
-from forestall.seams import ImageTextEncoder, OracleView, Parts
+from forestall.seams.acting import OracleView
+from forestall.seams.perceiving import ImageTextEncoder
+from forestall.seams.running import Parts
 from forestall.sensors import REALISTIC, Errors, SensorPart
 from forestall.types.kind import Settled
 

@@ -1,6 +1,6 @@
 """Factory of the strategy that watches: every judge there is, beside one another.
 
-Named in `registry`, called through `parts`; calls `judging` for what one part alone does not tell.
+Named in `tables`, called through `parts`; calls `judging` for what one part alone does not tell.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from forestall.errors import InputError
 from forestall.kinds import DETECTOR, REASONER, RETRIEVER, TEXT_ENCODER
 from forestall.memory.retrieval import EmbeddingRetriever
 from forestall.planning.validate import GraphValidator
-from forestall.seams import Detector, Parts
+from forestall.seams.judging import Detector
+from forestall.seams.running import Parts
 from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge, WholeSceneJudge
 from forestall.strategies.plan_check import PlanChecking
 from forestall.strategies.watch import Watch

@@ -6,13 +6,10 @@ import json
 import os
 import time
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from forestall.cli.flags import ComparingFlags
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
+from forestall.cli.flags import ComparingFlags, Flag, Json, Names
 
 DEFAULTS = ComparingFlags()
 
@@ -26,7 +23,7 @@ def speed(
     seed: int = 0,
     out: Path | None = None,
     as_json: Json = False,
-    quiet: Annotated[bool, Parameter(negative="")] = False,
+    quiet: Flag = False,
 ) -> int:
     """Milliseconds per picture, graph, comparison and plan; seconds per episode.
 
@@ -62,15 +59,15 @@ def speed(
 @bench.command
 def episodes(
     *,
-    task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
-    scenario: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
-    strategy: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    task: Names = None,
+    scenario: Names = None,
+    strategy: Names = None,
     seeds: str | None = None,
     jobs: int | None = None,
     out: Path | None = None,
     parts: ComparingFlags = DEFAULTS,
     as_json: Json = False,
-    quiet: Annotated[bool, Parameter(negative="")] = False,
+    quiet: Flag = False,
 ) -> int:
     """Run many episodes and count successes and alarms; every alarm without scenario is false.
 

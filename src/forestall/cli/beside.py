@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
+from forestall.cli.flags import Flag, Names
 
 if TYPE_CHECKING:
     from forestall.assembly.configuration import RunConfig
     from forestall.assembly.make import Prepared
-    from forestall.seams import Listener
+    from forestall.seams.running import Listener
     from forestall.types.demonstration import Demonstration
     from forestall.types.episode import EpisodeRecord
 
@@ -24,15 +24,13 @@ ALL = "all"
 FIRST, OTHERS = "proactive", ("none", "post-hoc", "online")
 """The paper's four; the others lie beside the first."""
 
-Names = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
-
 
 def beside(
     run: Path,
     /,
     *,
     strategy: Names = None,
-    quiet: Annotated[bool, Parameter(negative="")] = False,
+    quiet: Flag = False,
 ) -> int:
     """Run what a run began with once more, under another strategy, and draw its page again.
 

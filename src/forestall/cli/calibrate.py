@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from forestall.cli.flags import SeeingFlags
+from forestall.cli.flags import Flag, Names, SeeingFlags
 from forestall.cli.listing import print_table, say
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from forestall.calibration.fitted import CalibrationTable, Fit
     from forestall.report.calibration_figure import Panel
 
-Quiet = Annotated[bool, Parameter(negative="")]
 
 DEFAULTS = SeeingFlags()
 
@@ -31,15 +30,15 @@ def calibrate(
     /,
     *,
     level: float | None = None,
-    judge: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    judge: Names = None,
     references: Path | None = None,
     divide: Literal["undo", "skill", "none"] = "undo",
     irreversible_share: float = 2 / 3,
-    pooled: Annotated[bool, Parameter(negative="")] = False,
+    pooled: Flag = False,
     later: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")] = None,
     out: Path | None = None,
     parts: SeeingFlags = DEFAULTS,
-    quiet: Quiet = False,
+    quiet: Flag = False,
 ) -> int:
     """Draw the line of a judge where at most so many good runs have a false alarm.
 

@@ -9,16 +9,15 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Quiet = Annotated[bool, Parameter(negative="")]
-Names = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
+from forestall.cli.flags import Flag, Json, Names
+
 Sets = Annotated[list[str] | None, Parameter(name="--set", consume_multiple=True, negative="")]
 
 cases = App(name="cases", help="What the experiments start from.")
 
 
 @cases.command(name="list")
-def list_(*, of: Sets = None, kinds: Quiet = False, as_json: Json = False) -> int:
+def list_(*, of: Sets = None, kinds: Flag = False, as_json: Json = False) -> int:
     """Count the sets of cases: tasks, scenarios, kinds, rooms.
 
     Args:
@@ -56,7 +55,7 @@ def judge(
     world: str = "",
     jobs: int = 1,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Flag = False,
 ) -> int:
     """Play starts without a monitor and say whether they fail or succeed as their set says.
 
@@ -132,7 +131,7 @@ def judge(
 
 @cases.command
 def draw(
-    folder: Path, /, *, task: Names = None, seed: int = 0, jobs: int = 1, quiet: Quiet = False
+    folder: Path, /, *, task: Names = None, seed: int = 0, jobs: int = 1, quiet: Flag = False
 ) -> int:
     """Draw the further sets anew and write their files: FOLDER/SET/TASK.toml.
 

@@ -6,11 +6,11 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from forestall.cli.flags import SeeingFlags
+from forestall.cli.flags import Flag, Json, Names, SeeingFlags
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from forestall.assembly.configuration import RunConfig
     from forestall.types.demonstration import Demonstration
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Quiet = Annotated[bool, Parameter(negative="")]
 
 DEFAULTS = SeeingFlags()
 
@@ -31,14 +29,14 @@ def record(
     memory: Path,
     /,
     *,
-    task: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    task: Names = None,
     kitchens: int | None = None,
     seed: int | None = None,
-    varied: Annotated[bool, Parameter(negative="")] = False,
+    varied: Flag = False,
     parts: SeeingFlags = DEFAULTS,
     jobs: int | None = None,
-    keep_observations: Annotated[bool, Parameter(negative="")] = False,
-    quiet: Quiet = False,
+    keep_observations: Flag = False,
+    quiet: Flag = False,
 ) -> int:
     """Run nominal plans in seeded kitchens and keep the successful runs; goes on after a kill.
 
@@ -144,10 +142,10 @@ def label(
     /,
     *,
     subtask: str,
-    fact: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
+    fact: Names = None,
     task: str = "",
     domain: str | None = None,
-    new: Annotated[bool, Parameter(negative="")] = False,
+    new: Flag = False,
 ) -> int:
     """Keep what somebody says should hold before a subtask.
 

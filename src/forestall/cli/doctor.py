@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
+from forestall.cli.flags import Json
 from forestall.extras import EXTRAS, how, installed
 
 if TYPE_CHECKING:
     from forestall.types.world import Working
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 
 def doctor(*, as_json: Json = False) -> int:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from forestall.cli.flags import Flag, Json
 from forestall.cli.listing import say
 
 if TYPE_CHECKING:
     from forestall.domain.model import Domain
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Flag = Annotated[bool, Parameter(negative="")]
 
 domain = App(name="domain", help="List, show, check, distort and export domains.")
 

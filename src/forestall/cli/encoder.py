@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Quiet = Annotated[bool, Parameter(negative="")]
+from forestall.cli.flags import Flag, Json
 
 PICTURES = Path("runs/encoder/pictures")
 
@@ -26,7 +24,7 @@ def pictures(
     test: int = 160,
     unseen: int = 60,
     jobs: int | None = None,
-    quiet: Quiet = False,
+    quiet: Flag = False,
 ) -> int:
     """Draw seeded scenes in every state and keep crops of what is in them; goes on after a kill.
 
@@ -60,7 +58,7 @@ def train_(
     steps: int = 5000,
     batch: int = 256,
     seed: int = 0,
-    quiet: Quiet = False,
+    quiet: Flag = False,
 ) -> int:
     """Train both towers, export them to ONNX, fit temperatures and thresholds.
 
@@ -90,7 +88,7 @@ def test_(
     out: Path = Path("runs/encoder/test"),
     split: str = "test",
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Flag = False,
 ) -> int:
     """Measure an encoder on pictures that it was not trained on; tables and a page.
 

@@ -8,11 +8,11 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import App, Parameter
 
-from forestall.cli.flags import AblationFlags, ComparingFlags, SeeingFlags
+from forestall.cli.flags import AblationFlags, ComparingFlags, Flag, Json, Names, SeeingFlags
 
 if TYPE_CHECKING:
     from forestall.experiments.cost import Cost
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 MAIN_TABLES = ("sentences", "side-by-side", "strategies-side-by-side")
 """Printed; all of them are in the folder."""
-
-Flag = Annotated[bool, Parameter(negative="")]
 
 
 @Parameter(name="*")
@@ -59,9 +57,9 @@ class Options:
     seeds: int = 1
     jobs: int | None = None
     limit: int | None = None
-    sets: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
-    strategies: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
-    profiles: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
+    sets: Names = None
+    strategies: Names = None
+    profiles: Names = None
     part: float | None = None
     quick: Flag = False
     demonstrations: int | None = None
@@ -69,7 +67,7 @@ class Options:
     engine: str = "local"
     address: str | None = None
     pages: str = "telling"
-    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
+    as_json: Json = False
     quiet: Flag = False
 
 
@@ -130,7 +128,7 @@ def report(
     /,
     *,
     out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    as_json: Json = False,
 ) -> int:
     """Make the tables, figures and page of a folder of results again; nothing is run.
 

@@ -18,6 +18,11 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from forestall.assembly.configuration import Given
 
+Flag = Annotated[bool, Parameter(negative="")]
+"""Given or not; it has no opposite."""
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+Names = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
+"""One or several after the flag."""
 Settings = Annotated[list[str] | None, Parameter(name="--set", negative="")]
 
 _OPTION = re.compile(r"--([a-z][a-z-]*\.[\w-]+)(?:=(.*))?", re.DOTALL)

@@ -5,21 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
-
-from forestall.cli.flags import SeeingFlags
+from forestall.cli.flags import Flag, Json, SeeingFlags
 
 if TYPE_CHECKING:
     from forestall.assembly.recorded import Opened
     from forestall.experiments.recorded import JudgedRun
-    from forestall.seams import PlanSet
+    from forestall.seams.others import PlanSet
     from forestall.types.recorded import ReadReport, Unread
 
 DEFAULTS = SeeingFlags()
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Quiet = Annotated[bool, Parameter(negative="")]
 
 MOST_TOLD = 12
 
@@ -32,10 +28,10 @@ def import_(
     *,
     layout: Path | None = None,
     steps: Path | None = None,
-    dry_run: Annotated[bool, Parameter(negative="")] = False,
+    dry_run: Flag = False,
     parts: SeeingFlags = DEFAULTS,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Flag = False,
 ) -> int:
     """Read recorded runs of others, or plans of others.
 

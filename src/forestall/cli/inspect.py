@@ -6,11 +6,9 @@ import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from forestall.cli.flags import RunFlags, Settings
+from forestall.cli.flags import Json, RunFlags, Settings
 from forestall.cli.listing import say
 from forestall.config import DEFAULT_DOMAIN
 
@@ -18,8 +16,6 @@ if TYPE_CHECKING:
     from forestall.assembly.checking import Judgement, Judgements
     from forestall.types.decision import MonitorDecision
     from forestall.types.verdict import Replan, Verdict
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 
 def compare(

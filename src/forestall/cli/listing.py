@@ -8,7 +8,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
+from forestall.cli.flags import Json
+
 Schema = Annotated[bool, Parameter(name="--schema", negative="")]
 
 

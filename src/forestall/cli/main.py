@@ -64,7 +64,7 @@ def _answered(arguments: Sequence[str]) -> int:
 
 def _told(error: BaseException) -> tuple[str, int]:
     """What is said of an error, and its code."""
-    from forestall.errors import ForestallError, InputError, PerceptionError
+    from forestall.errors import ForestallError, InputError, PerceptionError, where
     from forestall.extras import missed
 
     if isinstance(error, InputError | PerceptionError):
@@ -73,14 +73,7 @@ def _told(error: BaseException) -> tuple[str, int]:
         return str(error), 3
     if (lacking := missed(error)) is not None:
         return lacking, 2
-    place = error.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    where = ""
-    if place is not None:
-        file = place.tb_frame.f_code.co_filename.replace("\\", "/").rpartition("/")[2]
-        where = f" ({file}, line {place.tb_lineno})"
-    text = f"internal error: {type(error).__name__}: {str(error)[:300]}{where}"
+    text = f"internal error: {type(error).__name__}: {str(error)[:300]}{where(error)}"
     how = f"report it with what {DEBUG} shows (README, 'Reporting a fault')"
     return f"{text}. This is a fault of forestall, not an answer: {how}", OF_ITS_OWN
 

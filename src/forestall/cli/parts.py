@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
 
-from cyclopts import Parameter
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
+from forestall.cli.flags import Json
 
 
 def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
@@ -19,7 +16,8 @@ def parts(kind: str | None = None, /, *, as_json: Json = False) -> int:
             expectations, llm, reasoner, replanner, validator, limit, strategy.
         as_json: print JSON, always with options.
     """
-    from forestall.assembly.registry import TABLES, known, lacking, table
+    from forestall.assembly.registry import known, lacking, table
+    from forestall.assembly.tables import TABLES
     from forestall.extras import how
 
     if not as_json and kind is None:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from forestall.cli.flags import SeeingFlags
+from forestall.cli.flags import Json, SeeingFlags
 
 DEFAULTS = SeeingFlags()
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 
 def perceive(

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from forestall.cli.flags import Settings
+from forestall.cli.flags import Json, Settings
 
 if TYPE_CHECKING:
     from forestall.assembly.plan_checking import CheckedPlan
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 Steps = Annotated[str, Parameter(allow_leading_hyphen=True)]
 

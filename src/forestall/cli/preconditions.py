@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
+from forestall.cli.flags import Json, Names
+
 if TYPE_CHECKING:
     from forestall.assembly.configuration import Given
     from forestall.assembly.mined import Remembered, Row, Shown
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Texts = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
 
 preconditions = App(
     name="preconditions", help="What is mined from demonstrations, and corrections by hand."
@@ -171,9 +171,9 @@ def edit(
     memory: Path,
     /,
     *,
-    drop: Texts = None,
-    add: Texts = None,
-    undo: Texts = None,
+    drop: Names = None,
+    add: Names = None,
+    undo: Names = None,
     task: str = "",
     note: str = "",
     domain: str | None = None,

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from forestall.cli.flags import RunFlags
+from forestall.cli.flags import Json, RunFlags
 
 if TYPE_CHECKING:
     from forestall.assembly.replaying import Replayed, Said
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 DEFAULTS = RunFlags()
 _LONGEST = 90

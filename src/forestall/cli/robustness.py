@@ -5,17 +5,15 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from forestall.cli.flags import ComparingFlags
+from forestall.cli.flags import ComparingFlags, Flag, Json, Names
 
 if TYPE_CHECKING:
     from forestall.experiments.cost import Cost
 
-Names = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
-Flag = Annotated[bool, Parameter(negative="")]
 
 PARTS = ComparingFlags()
 
@@ -37,7 +35,7 @@ def robustness(
     out: Path | None = None,
     engine: str = "local",
     parts: ComparingFlags = PARTS,
-    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    as_json: Json = False,
     quiet: Flag = False,
 ) -> int:
     """What judges detect, and how often they cry wolf, through sensors with one error each.

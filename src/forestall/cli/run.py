@@ -10,15 +10,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from forestall.cli.beside import (
     ALL,
     FIRST,
     OTHERS,
-    Names,
     beside_json,
     named,
     recorded,
@@ -26,12 +23,11 @@ from forestall.cli.beside import (
     told,
 )
 from forestall.cli.demos import memory_of
-from forestall.cli.flags import RunFlags
+from forestall.cli.flags import Flag, Json, Names, RunFlags
 
 if TYPE_CHECKING:
     from forestall.types.episode import EpisodeRecord
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 DEFAULTS = RunFlags()
 
@@ -48,8 +44,8 @@ def run(
     beside: Names = None,
     parts: RunFlags = DEFAULTS,
     as_json: Json = False,
-    quiet: Annotated[bool, Parameter(negative="")] = False,
-    live: Annotated[bool, Parameter(negative="")] = False,
+    quiet: Flag = False,
+    live: Flag = False,
 ) -> int:
     """Run one task from pixels to a plan that works, and write a page about it.
 

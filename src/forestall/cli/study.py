@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from forestall.cli.flags import Json
+
 if TYPE_CHECKING:
     from forestall.llm.explaining import Writer
 
 study = App(name="study", help="The human study: which of two explanations says better what fails.")
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 Several = Parameter(consume_multiple=True, negative="")
 
 

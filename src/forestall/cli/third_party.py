@@ -6,18 +6,17 @@ import json
 import lzma
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import App, Parameter
+from cyclopts import App
+
+from forestall.cli.flags import Flag, Json
 
 if TYPE_CHECKING:
     from forestall.experiments.third_party_needs import NeedsRow
     from forestall.experiments.third_party_rows import Judged, Row
     from forestall.statistics.cells import Table
     from forestall.statistics.intervals import Metric
-
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-Switch = Annotated[bool, Parameter(negative="")]
 
 
 def register(bench: App) -> None:
@@ -29,11 +28,11 @@ def third_party(
     household: str = "virtualhome",
     *,
     packages: Path | None = None,
-    development: Switch = False,
-    pooled: Switch = False,
+    development: Flag = False,
+    pooled: Flag = False,
     out: Path | None = None,
     as_json: Json = False,
-    quiet: Switch = False,
+    quiet: Flag = False,
 ) -> int:
     """False alarms on good runs, detection of failing ones, mined needs against true ones.
 

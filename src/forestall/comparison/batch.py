@@ -35,7 +35,7 @@ from forestall.comparison.prepare import (
     widened,
 )
 from forestall.domain.model import Domain
-from forestall.seams import TextEncoder
+from forestall.seams.perceiving import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Calibration, Decision, Reference, ScoreParts, Verdict
 

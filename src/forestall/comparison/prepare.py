@@ -20,7 +20,7 @@ import numpy.typing as npt
 from forestall.comparison.looks import NEVER, QUANTUM, Floats, Ints, Looks, looks_of
 from forestall.comparison.options import CountedConfig, Feature
 from forestall.domain.model import Domain
-from forestall.seams import TextEncoder
+from forestall.seams.perceiving import TextEncoder
 from forestall.types.facts import GRIPPER, category_of, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph
 

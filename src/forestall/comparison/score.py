@@ -21,7 +21,7 @@ from forestall.comparison.options import (
 )
 from forestall.comparison.prepare import LabelTable, prepare
 from forestall.domain.model import Domain
-from forestall.seams import TextEncoder
+from forestall.seams.perceiving import TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Discrepancy, ScoreParts
 

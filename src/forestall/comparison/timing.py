@@ -16,7 +16,7 @@ from forestall.comparison.batch import BatchScorer
 from forestall.comparison.options import Feature, ScoreConfig
 from forestall.domain.model import Domain
 from forestall.errors import InputError
-from forestall.seams import TextEncoder
+from forestall.seams.perceiving import TextEncoder
 from forestall.types.facts import GRIPPER
 from forestall.types.feature import quantised
 from forestall.types.graph import ObjectNode, Relation, SceneGraph

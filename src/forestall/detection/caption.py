@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from forestall.detection.baseline import check_same, judged, of_nearest
 from forestall.detection.scene_graph import DetectorConfig
 from forestall.embeddings.views import caption_rows
-from forestall.seams import Captioner, TextEncoder
+from forestall.seams.perceiving import Captioner, TextEncoder
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.verdict import Reference, Verdict, demonstrations_of, scenes

@@ -11,7 +11,7 @@ from forestall.detection.baseline import check_same, judged, of_nearest
 from forestall.detection.scene_graph import DetectorConfig
 from forestall.embeddings.views import image_feature
 from forestall.errors import InputError
-from forestall.seams import ImageEncoder
+from forestall.seams.perceiving import ImageEncoder
 from forestall.types.feature import unquantised
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation

@@ -22,7 +22,7 @@ from forestall.comparison.relevance import counts
 from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
 from forestall.domain.model import Domain
 from forestall.errors import InputError
-from forestall.seams import Expectations
+from forestall.seams.judging import Expectations
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation

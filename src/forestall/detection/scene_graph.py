@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from forestall.calibration.fitted import JudgeThresholds
 from forestall.errors import InputError
-from forestall.seams import GraphScorer
+from forestall.seams.judging import GraphScorer
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask

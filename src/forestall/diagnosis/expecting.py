@@ -16,7 +16,7 @@ from forestall.llm import words
 from forestall.llm.answers import Said, because, expectations, expectations_schema
 from forestall.llm.asking import answered
 from forestall.llm.prompts import rendered
-from forestall.seams import LanguageModel
+from forestall.seams.language import LanguageModel
 from forestall.supervision import deadline
 from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import category_of

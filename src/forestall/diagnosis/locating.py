@@ -24,7 +24,7 @@ from forestall.llm.answers import (
 )
 from forestall.llm.asking import answered
 from forestall.llm.prompts import rendered
-from forestall.seams import LanguageModel
+from forestall.seams.language import LanguageModel
 from forestall.supervision import deadline
 from forestall.types.exchange import Exchange, Request
 from forestall.types.runtime import BoundaryContext

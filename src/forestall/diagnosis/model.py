@@ -18,7 +18,8 @@ from forestall.llm import words
 from forestall.llm.answers import Explained, because, diagnosis_schema, explanation
 from forestall.llm.asking import answered
 from forestall.llm.prompts import rendered
-from forestall.seams import LanguageModel, Reasoner
+from forestall.seams.judging import Reasoner
+from forestall.seams.language import LanguageModel
 from forestall.supervision import deadline
 from forestall.types.exchange import Exchange, Request
 from forestall.types.observation import Rgb

@@ -22,7 +22,7 @@ from forestall.comparison.relevance import counts
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
 from forestall.records.sentences import in_demonstrations
-from forestall.seams import Expectations
+from forestall.seams.judging import Expectations
 from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask

@@ -5,12 +5,13 @@ Called by the run's state and by strategies; calls `evaluate` and `truth`.
 
 from __future__ import annotations
 
-from forestall.domain.evaluate import TRUE, by_number, evaluate, solutions
+from forestall.domain.evaluate import evaluate, solutions
 from forestall.domain.formula import TRUE as ALWAYS
 from forestall.domain.model import Domain
 from forestall.domain.schema import Choice
 from forestall.domain.truth import GraphView, truth, view
-from forestall.types.facts import Literal, Truth
+from forestall.domain.view import TRUE
+from forestall.types.facts import Literal, Truth, by_number
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 

@@ -1,16 +1,16 @@
 """The one evaluator of formulas, over anything that knows facts: a scene graph or a planning state.
 
-Called by `truth`, the planner's state and the checks; calls nothing but the view that it is given.
-Three values: 0 false, 1 unobserved, 2 true; "and" is the smaller, "or" the larger (Kleene).
+Called by `truth`, the planner's state and the checks; calls the `View` that it is given, and
+`circle` for facts that are defined by each other.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache
-from typing import Protocol, TypeVar
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
+from forestall.domain.circle import Circle
 from forestall.domain.formula import (
     And,
     Every,
@@ -23,46 +23,10 @@ from forestall.domain.formula import (
     free,
     normal,
 )
-from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain
+from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY
 from forestall.domain.schema import Predicate, PredicateKind
-from forestall.types.facts import Literal, category_of, is_instance
-
-FALSE, UNOBSERVED, TRUE = 0, 1, 2
-
-UNKNOWN = "?"
-"""Something that nobody has seen, where a place may hold more than is known."""
-
-Binding = Mapping[str, str]
-
-
-class View(Protocol):
-    """What knows facts."""
-
-    domain: Domain
-
-    def things(self) -> Iterable[str]:
-        """Every known thing."""
-
-    def category(self, name: str) -> str:
-        """The category of a thing, of a made name too."""
-
-    def of_kind(self, kind: str) -> Iterable[str]:
-        """Known things that count as a tag, a category or an attribute holder."""
-
-    def fact(self, predicate: str, args: tuple[str, ...]) -> int:
-        """Truth of a relation, a history or a built-in fact."""
-
-    def value(self, name: str, attribute: str) -> str | None:
-        """The value of an attribute; None where it is unobserved or not an attribute of it."""
-
-    def unsure(self, name: str, attribute: str) -> bool:
-        """Whether a missing value may be any (unobserved), and not just not an attribute."""
-
-    def related(self, predicate: str, position: int, args: tuple[str, ...]) -> Iterable[str]:
-        """What may stand at a position so that a relation is not false, the rest being given."""
-
-    def with_value(self, attribute: str, value: str) -> Iterable[str]:
-        """Things whose attribute may have a value."""
+from forestall.domain.view import FALSE, TRUE, UNKNOWN, UNOBSERVED, Binding, View
+from forestall.types.facts import Literal, by_number, number_of
 
 
 def evaluate(formula: Formula, view: View, names: Binding) -> int:
@@ -143,88 +107,6 @@ def _defined_truth(known: Predicate, args: tuple[str, ...], view: View) -> int:
     return evaluate(_normal(known.definition), view, binding)
 
 
-DEEP = 12
-"""How many facts that are defined by each other are worked out one inside the other."""
-
-
-class DeeperError(Exception):
-    """Says which fact is to be worked out before one that led to it over too many others."""
-
-    def __init__(self, known: Predicate, args: tuple[str, ...]) -> None:
-        super().__init__(known.name, *args)
-        self.known, self.those = known, args
-
-
-class Circle:
-    """What is known so far of predicates that are defined with each other.
-
-    Args:
-        work_out: the truth of a derived fact by its definition; it asks this circle for the others.
-    """
-
-    __slots__ = ("best", "closed", "depth", "now", "work_out")
-
-    def __init__(self, work_out: Callable[[Predicate, tuple[str, ...]], int]) -> None:
-        self.work_out = work_out
-        self.best: dict[tuple[str, ...], int] = {}
-        self.now: dict[tuple[str, ...], int | None] = {}
-        self.closed = False
-        self.depth = 0
-
-    def ask(self, known: Predicate, args: tuple[str, ...]) -> int:
-        """The truth as far as it is known; None marks what is being asked just now.
-
-        Raises:
-            DeeperError: it is to be worked out by itself first.
-        """
-        key = (known.name, *args)
-        if key in self.now:
-            found = self.now[key]
-            if found is not None:
-                return found
-            self.closed = True
-            return self.best.get(key, FALSE)
-        if self.depth == DEEP:
-            raise DeeperError(known, args)
-        self.now[key] = None
-        self.depth += 1
-        try:
-            truth = self.now[key] = self.work_out(known, args)
-        except BaseException:
-            del self.now[key]
-            raise
-        finally:
-            self.depth -= 1
-        return truth
-
-    def settle(self, known: Predicate, args: tuple[str, ...]) -> int:
-        """The least fixpoint, so that facts that go in a circle support nothing.
-
-        Afterwards `now` has the truth of everything that was asked.
-        """
-        while True:
-            truth = self._chained(known, args)
-            best = {k: t for k, t in self.now.items() if t}
-            if not self.closed or best == self.best:
-                return truth
-            self.best, self.now, self.closed = best, {}, False
-
-    def _chained(self, known: Predicate, args: tuple[str, ...]) -> int:
-        """Ask, what lies too deep first: a chain of any length takes no more of Python's stack."""
-        waiting = [(known, args)]
-        while True:
-            one, those = waiting[-1]
-            self.now[one.name, *those] = None
-            try:
-                truth = self.now[one.name, *those] = self.work_out(one, those)
-            except DeeperError as deeper:
-                waiting.append((deeper.known, deeper.those))
-                continue
-            waiting.pop()
-            if not waiting:
-                return truth
-
-
 _open = threading.local()
 
 
@@ -258,17 +140,6 @@ def static_holds(view: View, predicate: str, args: tuple[str, ...]) -> bool:
     partners = sorted(view.of_kind(kinds[1]), key=by_number)
     same = any(number_of(p) == number_of(args[0]) for p in partners)
     return not same and partners[:1] == [args[1]]
-
-
-def number_of(name: str) -> int:
-    """The instance number of a name, 1 where it carries none."""
-    return int(name.rpartition("-")[2]) if is_instance(name) else 1
-
-
-@lru_cache(maxsize=4096)
-def by_number(name: str) -> tuple[str, int]:
-    """Sort key: category first, then number ("Mug-2" before "Mug-10")."""
-    return category_of(name), number_of(name)
 
 
 def solutions(

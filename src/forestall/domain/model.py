@@ -12,6 +12,7 @@ from functools import cached_property
 
 from forestall.domain.formula import Formula, literals
 from forestall.domain.phrases import THING, with_articles
+from forestall.domain.recursion import circles
 from forestall.domain.schema import (
     Category,
     Predicate,
@@ -318,27 +319,7 @@ class Domain:
 
         The predicates of one circle share one set.
         """
-        uses = {
-            p.name: {x.predicate for x, _ in literals(p.definition) if x.predicate in self.derived}
-            for p in self.derived.values()
-            if p.definition is not None
-        }
-        reached: dict[str, set[str]] = {}
-        for name, used in uses.items():
-            found, left = set[str](), list(used)
-            while left:
-                other = left.pop()
-                if other not in found:
-                    found.add(other)
-                    left += uses[other]
-            reached[name] = found
-        circles: dict[frozenset[str], frozenset[str]] = {}
-        found_in: dict[str, frozenset[str]] = {}
-        for name, found in reached.items():
-            if name in found:
-                members = frozenset(o for o in found if name in reached[o])
-                found_in[name] = circles.setdefault(members, members)
-        return found_in
+        return circles({p.name: p.definition for p in self.derived.values() if p.definition})
 
     # --- skills ----------------------------------------------------------------------------------
 

@@ -1,42 +1,36 @@
-"""Writes any domain as a lifted PDDL domain, and a state and a goal as a problem of it.
+"""Writes any domain as a lifted PDDL domain; `pddl_state` writes problems of it.
 
-Called by the command line and by cross-checks with other planners; calls `pddl_write`. The text is
-sorted and never changes between runs. Categories are types; tags are types where they are
-categories too, and predicates that never change otherwise. What a skill deals with without naming
-it becomes a further parameter. Words, preferences, phrases and durations have no place in PDDL.
-What happens by itself, and skills that make things or take them away, cannot be said: they are
-refused unless the caller says that they are to be left out.
+Called by the command line and by cross-checks with other planners; calls `pddl_write` and
+`pddl_variants`. The text is sorted and never changes between runs. Categories are types; tags are
+types where they are categories too, and predicates that never change otherwise. What a skill deals
+with without naming it becomes a further parameter. Words, preferences, phrases and durations have
+no place in PDDL. What happens by itself, and skills that make things or take them away, cannot be
+said: they are refused unless the caller says that they are to be left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from forestall.domain.evaluate import TRUE as HOLDS
-from forestall.domain.evaluate import View, by_number, evaluate, solutions, static_holds
 from forestall.domain.formula import (
     And,
     Every,
     Formula,
     Not,
-    Or,
     Parameter,
-    Some,
     bind,
-    literals,
 )
 from forestall.domain.model import FACING, LOCATED, SAME, SAME_CATEGORY, Domain
 from forestall.domain.pddl_problem import types_of
 from forestall.domain.pddl_text import ROOT
-from forestall.domain.pddl_write import THING, Writer, without
-from forestall.domain.schema import Choice, Effect, PredicateKind, Skill
-from forestall.errors import DomainError, UnknownNameError
+from forestall.domain.pddl_variants import BEFORE, Variant, variants
+from forestall.domain.pddl_write import THING, Writer
+from forestall.domain.schema import PredicateKind, Skill
+from forestall.errors import DomainError
 from forestall.types.facts import Literal
 
 HAND = "hand"
-BEFORE = "before"
-"""Predicate of the order of things, which decides what a skill deals with of several."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,16 +54,6 @@ class PddlDomain:
     actions: dict[str, Action]
 
 
-@dataclass(frozen=True, slots=True)
-class _Variant:
-    """A skill with a decision about what it deals with."""
-
-    name: str
-    parameters: tuple[Parameter, ...]
-    needs: tuple[Formula, ...]
-    effects: tuple[Effect, ...]
-
-
 def domain_pddl(
     domain: Domain, *, without_processes: bool = False, without_makers: bool = False
 ) -> PddlDomain:
@@ -90,12 +74,12 @@ def domain_pddl(
             "export without processes to leave it out"
         )
     writer = Writer(domain)
-    skills = _skills(domain, without_makers)
-    variants = [(s, v) for s in skills for v in _variants(s)]
+    skills = able_skills(domain, without_makers)
+    each = [(s, v) for s in skills for v in variants(s)]
     actions: dict[str, Action] = {}
     blocks: list[str] = []
-    used, numbers = _used(writer, domain, skills)
-    for skill, variant in sorted(variants, key=lambda x: writer.name(x[1].name)):
+    used, numbers = used_of(writer, domain, skills)
+    for skill, variant in sorted(each, key=lambda x: writer.name(x[1].name)):
         if variant.name != skill.name and not variant.effects:
             continue  # without the thing that it deals with it does nothing
         name = writer.name(variant.name)
@@ -106,57 +90,21 @@ def domain_pddl(
     needed = [":adl", *([":derived-predicates"] if derived else []), ":typing"]
     lines.append(f"  (:requirements {' '.join(needed)})")
     lines += _types(writer)
-    lines += _section(":constants", [f"{writer.name(n)} - {writer.name(c)}"
+    lines += section(":constants", [f"{writer.name(n)} - {writer.name(c)}"
                                      for n, c in sorted(domain.constants)]
                       + [f"{writer.name(h)} - {HAND}" for h in sorted(writer.hands)])  # fmt: skip
     ordered = any(s.choices for s in skills)
-    lines += _section(":predicates", sorted(_predicates(writer, used, numbers, ordered)))
+    lines += section(":predicates", sorted(_predicates(writer, used, numbers, ordered)))
     lines += [f"  {writer.derived(name)}" for name in derived]
     return PddlDomain("\n".join((*lines, *blocks, ")")) + "\n", actions)
 
 
-def problem_pddl(
-    view: View, goal: Formula, name: str = "problem", *, without_makers: bool = False
-) -> str:
-    """A state and a goal as a problem of the domain that `domain_pddl` writes.
-
-    What must hold when the robot leaves is a part of the goal.
-
-    Args:
-        view: what holds at first; what is unobserved counts as false.
-        goal: what must hold in the end, over names of things.
-        name: of the problem.
-        without_makers: as the domain was written.
+def able_skills(domain: Domain, without_makers: bool) -> list[Skill]:
+    """The robot's skills that PDDL can say.
 
     Raises:
-        InputError: the goal speaks of a thing that is not there.
+        DomainError: one makes things or takes them away, and is not to be left out.
     """
-    domain = view.domain
-    writer = Writer(domain)
-    skills = _skills(domain, without_makers)
-    constants = dict(domain.constants)
-    things = sorted(view.things(), key=by_number)
-    for literal, _ in literals(goal):
-        for arg in literal.args:
-            if not arg.startswith("?") and arg not in (*things, *constants, *writer.hands):
-                raise UnknownNameError(f"thing in the goal {literal}", arg, things)
-    wanted = And((goal, *rules)) if (rules := _safe(domain, ("leaving", ""))) else goal
-    lines = [
-        f"(define (problem {writer.name(name)})",
-        f"  (:domain {writer.name(domain.name)})",
-        *_section(":objects", [f"{writer.name(t)} - {writer.name(view.category(t))}"
-                               for t in things if t not in constants]),
-        *_section(":init", sorted({*_facts(view, writer, things, skills)})),
-        f"  (:goal {writer.formula(wanted)})",
-        ")",
-    ]  # fmt: skip
-    return "\n".join(lines) + "\n"
-
-
-# --- the domain -----------------------------------------------------------------------------------
-
-
-def _skills(domain: Domain, without_makers: bool) -> list[Skill]:
     able = domain.robot.skills or tuple(domain.skills)
     found = [domain.skills[s] for s in able]
     makers = [s for s in found if s.makes or any(e.gone for e in s.effects)]
@@ -183,7 +131,7 @@ def _types(writer: Writer) -> list[str]:
             entries.append(f"{spelt} - {writer.top if above == ROOT else writer.name(above)}")
     if writer.hands:
         entries += [f"{THING} - {ROOT}", f"{HAND} - {ROOT}"]
-    return _section(":types", sorted(entries))
+    return section(":types", sorted(entries))
 
 
 def _predicates(
@@ -208,9 +156,9 @@ def _predicates(
         yield f"({BEFORE} ?thing ?other)"
 
 
-def _action(writer: Writer, name: str, skill: Skill, variant: _Variant, facing: bool) -> str:
+def _action(writer: Writer, name: str, skill: Skill, variant: Variant, facing: bool) -> str:
     tags = writer.tags_of(variant.parameters)
-    rules = (*_safe(writer.domain, ("",)), *_safe_before(writer.domain, skill))
+    rules = (*safe(writer.domain, ("",)), *_safe_before(writer.domain, skill))
     needs = (*tags, *variant.needs, *rules)
     kinds = {p.name: p.kind for p in variant.parameters}
     effects = writer.effects(variant.effects, kinds)
@@ -236,13 +184,15 @@ def _joined(key: str, texts: list[str]) -> list[str]:
     return [f"    {key} (and", *(f"      {t}" for t in texts[:-1]), f"      {texts[-1]})"]
 
 
-def _section(key: str, entries: list[str]) -> list[str]:
+def section(key: str, entries: list[str]) -> list[str]:
+    """A section of a file, line by line; nothing for one without entries."""
     if not entries:
         return []
     return [f"  ({key}", *(f"    {e}" for e in entries), "  )"]
 
 
-def _safe(domain: Domain, when: tuple[str, ...]) -> list[Formula]:
+def safe(domain: Domain, when: tuple[str, ...]) -> list[Formula]:
+    """That what must never be so at these moments is not so."""
     return [
         Every(rule.variables, Not(rule.never)) if rule.variables else Not(rule.never)
         for rule in domain.safety
@@ -268,9 +218,10 @@ def _safe_before(domain: Domain, skill: Skill) -> Iterator[Formula]:
         yield Every(variables, Not(harm)) if variables else Not(harm)
 
 
-def _used(
+def used_of(
     writer: Writer, domain: Domain, skills: list[Skill]
 ) -> tuple[frozenset[str], frozenset[str]]:
+    """Predicates and numbers that a domain speaks of, with these of its skills."""
     formulas: list[Formula] = [p.definition for p in domain.derived.values() if p.definition]
     for skill in skills:
         formulas += [n.formula for n in skill.needs]
@@ -280,131 +231,3 @@ def _used(
             formulas += [*choice.among, choice.such_that, choice.only_if]
     formulas += [rule.never for rule in domain.safety]
     return writer.used(formulas)
-
-
-# --- what skills deal with and do not name --------------------------------------------------------
-
-
-def _variants(skill: Skill) -> Iterator[_Variant]:
-    needs = tuple(n.formula for n in skill.needs)
-    if skill.done_when is not None:  # a step that changes nothing is no step of a plan
-        needs = (Not(skill.done_when), *needs)
-    start = _Variant(skill.name, skill.parameters, needs, skill.effects)
-    found = [start]
-    for choice in skill.choices:
-        found = [v for f in found for v in _decided(f, choice)]
-    yield from found
-
-
-def _decided(variant: _Variant, choice: Choice) -> Iterator[_Variant]:
-    """The variant with the thing that is chosen as a parameter, and the one without a thing."""
-    name = choice.variable.name
-    fitting = [And((a, choice.such_that)) for a in choice.among]
-    none = [Not(Some((choice.variable,), f)) for f in fitting]
-    other = Parameter(f"{name}_other", choice.variable.kind)
-    options: list[Formula] = []
-    for number, formula in enumerate(fitting):
-        later = Or(
-            (
-                Not(bind(formula, {name: other.name})),
-                Literal("same", (other.name, name)),
-                Literal(BEFORE, (name, other.name)),
-            )
-        )
-        options.append(And((formula, *none[:number], Every((other,), later))))
-    yield _Variant(
-        variant.name,
-        (*variant.parameters, choice.variable),
-        (choice.only_if, Or(tuple(options)), *variant.needs),
-        variant.effects,
-    )
-    idle: Formula = Not(choice.only_if)
-    if not choice.sentence:
-        idle = Or((idle, And(tuple(none))))
-    effects = []
-    for e in variant.effects:
-        facts = tuple(f for f in e.facts if name not in f.args)
-        copies = tuple(c for c in e.copies if name not in (c.target, c.source))
-        if facts or copies:
-            effects.append(Effect(e.variables, without(e.condition, name), facts, copies))
-    yield _Variant(
-        f"{variant.name}__no_{name.removeprefix('?')}",
-        variant.parameters,
-        (idle, *(without(n, name) for n in variant.needs)),
-        tuple(effects),
-    )
-
-
-# --- the problem ----------------------------------------------------------------------------------
-
-
-def _facts(view: View, writer: Writer, things: list[str], skills: list[Skill]) -> Iterator[str]:
-    domain = view.domain
-    used, numbers = _used(writer, domain, skills)
-    for p in domain.predicates.values():
-        if p.kind is PredicateKind.ATTRIBUTE:
-            yield from _values(view, writer, p.name, things)
-        elif p.kind is PredicateKind.STATIC:
-            yield from _static(view, writer, p.name)
-        elif p.kind is not PredicateKind.DERIVED:
-            yield from _relations(view, writer, p.name, len(p.parameters))
-    for thing in things:
-        yield from _about(view, writer, thing, used, numbers)
-    if SAME_CATEGORY in used:
-        yield from _pairs(SAME_CATEGORY, writer, (
-            (a, b) for a in things for b in things if view.category(a) == view.category(b)
-        ))  # fmt: skip
-    if any(s.choices for s in skills):
-        pairs = ((a, b) for i, a in enumerate(things) for b in things[i + 1 :])
-        yield from _pairs(BEFORE, writer, pairs)
-
-
-def _about(
-    view: View, writer: Writer, thing: str, used: frozenset[str], numbers: frozenset[str]
-) -> Iterator[str]:
-    domain = view.domain
-    kinds = domain.kinds(view.category(thing))
-    named = writer.name(thing)
-    for tag in domain.tags:
-        if tag in kinds and not writer.is_type(tag):
-            yield f"({writer.name(tag)} {named})"
-    for number in numbers:
-        value = domain.number(view.category(thing), number)
-        if value is not None:
-            yield f"({number}_{value} {named})"
-    for built_in in (LOCATED, FACING):
-        if built_in in used and view.fact(built_in, (thing,)) == HOLDS:
-            yield f"({built_in} {named})"
-
-
-def _pairs(name: str, writer: Writer, pairs: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    return (f"({' '.join((name, *map(writer.name, p)))})" for p in pairs)
-
-
-def _values(view: View, writer: Writer, attribute: str, things: list[str]) -> Iterator[str]:
-    for thing in things:
-        if attribute in view.domain.categories[view.category(thing)].attributes:
-            yield f"(has_{attribute} {writer.name(thing)})"
-        value = view.value(thing, attribute)
-        name = "" if value is None else writer.value_name(attribute, value)
-        if name:
-            yield f"({name} {writer.name(thing)})"
-
-
-def _static(view: View, writer: Writer, name: str) -> Iterator[str]:
-    for first, second in sorted(view.domain.statics.get(name, ())):
-        for a in view.of_kind(first):
-            for b in view.of_kind(second):
-                if static_holds(view, name, (a, b)):
-                    yield f"({writer.name(name)} {writer.name(a)} {writer.name(b)})"
-
-
-def _relations(view: View, writer: Writer, name: str, arity: int) -> Iterator[str]:
-    several = tuple(Parameter(f"?{i}") for i in range(arity))
-    fact = Literal(name, tuple(p.name for p in several))
-    if not several:
-        if evaluate(fact, view, {}) == HOLDS:
-            yield f"({writer.name(name)})"
-        return
-    found = (b for b, truth in solutions(several, fact, view, {}) if truth == HOLDS)
-    yield from _pairs(writer.name(name), writer, (tuple(b[v.name] for v in several) for b in found))

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Iterable, Mapping
 
-from forestall.domain.evaluate import FALSE, TRUE, UNKNOWN, UNOBSERVED, evaluate, literal_truth
+from forestall.domain.evaluate import evaluate, literal_truth
 from forestall.domain.formula import Formula
 from forestall.domain.model import FACING, LOCATED, Domain
 from forestall.domain.schema import PredicateKind
+from forestall.domain.view import FALSE, TRUE, UNKNOWN, UNOBSERVED
 from forestall.types.facts import Literal, Truth, category_of, is_instance
 from forestall.types.graph import ObjectNode, SceneGraph, Seen
 
@@ -20,7 +21,7 @@ _RECENT = 64
 
 
 class GraphView:
-    """A scene graph as something that knows facts (implements `evaluate.View`).
+    """A scene graph as something that knows facts (implements `view.View`).
 
     - What is outside every view is unobserved, never false: a thing, and what it has to others.
     - The inside of a container that no view reached may hold anything that is not in sight.

@@ -1,4 +1,4 @@
-"""Encoders of texts and of images; each stands behind a Protocol of `seams.py`."""
+"""Encoders of texts and of images; each stands behind a Protocol of `seams/perceiving.py`."""
 
 from forestall.embeddings.hashed import HashedTextEncoder
 

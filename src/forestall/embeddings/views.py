@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from forestall.seams import Captioner, ImageEncoder, TextEncoder
+from forestall.seams.perceiving import Captioner, ImageEncoder, TextEncoder
 from forestall.types.demonstration import View
 from forestall.types.feature import quantised
 from forestall.types.graph import SceneGraph

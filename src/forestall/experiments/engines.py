@@ -228,7 +228,7 @@ def _submitted(lane: Lane, function: Callable[[Any], Any], job: Any) -> Future[A
     """Start a job; a worker that died while it had none is replaced."""
     try:
         return lane.submit(function, job)
-    except Exception as error:
+    except Exception as error:  # only the lane knows how a dead worker shows
         if not lane.died(error):
             raise
         lane.renew()

@@ -33,7 +33,8 @@ from forestall.files import replace_file
 from forestall.kinds import PERCEIVER, REPLANNER, SEGMENTER
 from forestall.planning.planner import plan_goal
 from forestall.reading.fields import Field
-from forestall.seams import OpenWorld, Replanner
+from forestall.seams.acting import OpenWorld
+from forestall.seams.judging import Replanner
 from forestall.statistics.cells import Table
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.episode import EpisodeRecord

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.make import make_world
-from forestall.seams import WorldPart
+from forestall.seams.acting import WorldPart
 from forestall.statistics.cases import FURTHER_SPLITS, ROUNDS, Case, room
 from forestall.tasks.drawing import Drawer, Drawn
 from forestall.tasks.files import LoadedTask, load_scenario, load_task, long_task_names

@@ -31,7 +31,7 @@ from forestall.experiments.third_party_rows import (
 from forestall.kinds import DETECTOR, RETRIEVER, VALIDATOR
 from forestall.learning.learn import learn
 from forestall.planning.validate import GraphValidator
-from forestall.seams import Foreign
+from forestall.seams.others import Foreign
 from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge
 from forestall.types.demonstration import Demonstration
 from forestall.types.facts import Literal

@@ -23,7 +23,7 @@ from forestall.domain.formula import TRUE, And, Every, Formula, Not, Or, normal,
 from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
 from forestall.learning.learn import learn
-from forestall.seams import Foreign
+from forestall.seams.others import Foreign
 from forestall.statistics.intervals import Metric, rate
 from forestall.types.demonstration import Demonstration
 from forestall.types.facts import GRIPPER, Literal, category_of

@@ -16,14 +16,14 @@ from forestall.assembly.configuration import Choice, Given, RunConfig, run_confi
 from forestall.assembly.demonstrations import load_memory
 from forestall.assembly.make import Prepared, make_world, needs_memory, prepare, run_episode
 from forestall.domain.distort import distorted
-from forestall.errors import ForestallError
+from forestall.errors import ForestallError, where
 from forestall.experiments.runs import MODELS, Run, Settings
 from forestall.kinds import SENSOR, WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.exchanges import exchanges_of
 from forestall.records.record import RunRecorder
 from forestall.report.page import write_page
-from forestall.seams import WorldPart
+from forestall.seams.acting import WorldPart
 from forestall.statistics.rows import (
     EXACT,
     KIND,
@@ -169,7 +169,8 @@ def run_one(work: Work) -> dict[str, Any]:
     except OSError:
         raise  # a full or broken disk is no failed episode
     except Exception as error:  # noqa: BLE001 - whatever breaks is one failed episode, and is told
-        return broken_row(run, f"{type(error).__name__}: {error}", prepared).to_json()
+        told = f"{type(error).__name__}: {error}{where(error)}"
+        return broken_row(run, told, prepared).to_json()
 
 
 def broken_row(run: Run, error: str, prepared: Prepared) -> EpisodeRow:

@@ -13,7 +13,7 @@ from typing import TypeVar
 from forestall.deadline import Deadline
 from forestall.llm.answers import Unfit
 from forestall.llm.prompts import fragment
-from forestall.seams import LanguageModel
+from forestall.seams.language import LanguageModel
 from forestall.types.exchange import Exchange, Request
 
 T = TypeVar("T")

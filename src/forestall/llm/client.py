@@ -253,7 +253,7 @@ class OpenAIModel:
         except sdk.APIConnectionError as error:
             cause = error.__cause__ or error
             return _Got(problem=f"the endpoint cannot be reached: {self._told(cause)}", again=True)
-        except Exception as error:  # noqa: BLE001 - a library of somebody else's, on a thread
+        except Exception as error:  # noqa: BLE001 - transports of others, which differ by version
             return _Got(bytes(body), f"the call failed: {self._told(error)}", again=True)
 
     def _told(self, error: BaseException) -> str:

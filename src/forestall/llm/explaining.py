@@ -15,7 +15,7 @@ from forestall.deadline import Deadline
 from forestall.llm import words
 from forestall.llm.answers import Unfit, explanation_schema, sentence_of
 from forestall.llm.prompts import rendered
-from forestall.seams import LanguageModel
+from forestall.seams.language import LanguageModel
 from forestall.types.exchange import Exchange, Request
 from forestall.types.plan import Subtask
 

@@ -19,7 +19,7 @@ from forestall.files import naming
 from forestall.reading.documents import parse_json
 from forestall.reading.fields import Field
 from forestall.reading.files import read_text
-from forestall.seams import LanguageModel
+from forestall.seams.language import LanguageModel
 from forestall.types.exchange import Exchange, Request
 
 KIND = "forestall language model answers"

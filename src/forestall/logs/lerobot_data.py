@@ -1,6 +1,6 @@
 """LeRobot data sets as recorded runs (implements `seams.DataSet`).
 
-Named by `assembly.registry`; calls `lerobot_meta` and `lerobot_in`. An episode that cannot be used
+Named by `assembly.tables`; calls `lerobot_meta` and `lerobot_in`. An episode that cannot be used
 is told with its reason, and the next one is read.
 """
 

@@ -360,7 +360,7 @@ def _pixels(meta: Meta, key: str, cells: dict[str, Any], mode: str | None) -> np
         return np.asarray(image if mode is None else image.convert(mode))
     except InputError:
         raise
-    except Exception as error:
+    except Exception as error:  # decoders of Pillow raise anything over damaged bytes
         raise InputError(f"column {key!r}: a picture that cannot be read: {error}") from error
 
 

@@ -1,6 +1,6 @@
 """MCAP files as recorded runs (implements `seams.DataSet`).
 
-Named by `assembly.registry`; calls `mcap_index` and `mcap_in`. A file that cannot be used is told
+Named by `assembly.tables`; calls `mcap_index` and `mcap_in`. A file that cannot be used is told
 with its reason, and the next one is read.
 """
 

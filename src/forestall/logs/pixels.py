@@ -118,6 +118,6 @@ def _unpacked(message: Any) -> Any:
         image.load()
     except InputError:
         raise
-    except Exception as error:
+    except Exception as error:  # decoders of Pillow raise anything over damaged bytes
         raise InputError(f"a packed picture ({message.format!r}) that cannot be read") from error
     return image

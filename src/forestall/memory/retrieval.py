@@ -17,7 +17,8 @@ import numpy as np
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError, MemoryFileError
-from forestall.seams import DemonstrationStore, TextEncoder
+from forestall.seams.judging import DemonstrationStore
+from forestall.seams.perceiving import TextEncoder
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.facts import category_of
 from forestall.types.plan import Subtask

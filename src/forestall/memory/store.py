@@ -320,7 +320,7 @@ class SqliteStore:
         self._connection.execute("BEGIN IMMEDIATE")
         try:
             yield
-        except BaseException:
+        except BaseException:  # an interrupt, too, leaves nothing half stored
             self._connection.execute("ROLLBACK")
             raise
         self._connection.execute("COMMIT")

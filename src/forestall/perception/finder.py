@@ -14,7 +14,7 @@ from forestall.domain.model import Domain
 from forestall.domain.words import Words
 from forestall.errors import InputError, PerceptionError, UnknownNameError
 from forestall.perception.config import PerceptionConfig
-from forestall.seams import Finder, Outliner
+from forestall.seams.perceiving import Finder, Outliner
 from forestall.types.grounding import GroundedBox
 from forestall.types.observation import Detection, Frame
 

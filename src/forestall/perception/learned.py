@@ -18,7 +18,7 @@ import numpy.typing as npt
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.perception.kind import of_its_kind
-from forestall.seams import ImageTextEncoder
+from forestall.seams.perceiving import ImageTextEncoder
 from forestall.types.observation import Detection, Frame
 
 Floats = npt.NDArray[np.float64]

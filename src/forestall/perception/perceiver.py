@@ -33,7 +33,7 @@ from forestall.perception.unproject import (
     clouds,
     label_image,
 )
-from forestall.seams import ImageEncoder, Segmenter, StateEstimator
+from forestall.seams.perceiving import ImageEncoder, Segmenter, StateEstimator
 from forestall.types.facts import Change, category_of
 from forestall.types.feature import quantised
 from forestall.types.finding import Finding, refuse

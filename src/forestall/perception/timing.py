@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from forestall.seams import Perceiver
+from forestall.seams.perceiving import Perceiver
 from forestall.types.observation import Observation
 
 

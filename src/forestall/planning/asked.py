@@ -9,8 +9,10 @@ from collections.abc import Sequence
 from threading import get_ident
 from typing import TYPE_CHECKING
 
-from forestall.domain.evaluate import FALSE, TRUE, Circle, static_holds
+from forestall.domain.circle import Circle
+from forestall.domain.evaluate import static_holds
 from forestall.domain.schema import Predicate
+from forestall.domain.view import FALSE, TRUE
 from forestall.planning.nodes import Node
 from forestall.planning.schemas import schemas_of
 

@@ -12,8 +12,8 @@ from itertools import pairwise
 from forestall.deadline import Deadline
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.problem import Operator, Problem
-from forestall.planning.state import State, by_number
-from forestall.types.facts import category_of
+from forestall.planning.state import State
+from forestall.types.facts import by_number, category_of
 from forestall.types.plan import Subtask
 
 HURRY_S = 0.1

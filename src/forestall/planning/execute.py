@@ -10,14 +10,15 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from forestall.domain.evaluate import TRUE, by_number, solutions
+from forestall.domain.evaluate import solutions
 from forestall.domain.formula import Every, Fewer, Formula, Not, Or, Some, bind, free, normal
 from forestall.domain.model import LOCATED
 from forestall.domain.schema import Choice, Effect, Need, Skill
+from forestall.domain.view import TRUE
 from forestall.errors import InputError
 from forestall.planning.settle import change, settle
 from forestall.planning.state import State
-from forestall.types.facts import Literal, is_instance
+from forestall.types.facts import Literal, by_number, is_instance
 from forestall.types.plan import Subtask
 
 _PLACEHOLDER = re.compile(r"\{(\??\w+)(\.category)?\}")

@@ -12,8 +12,8 @@ from itertools import product
 
 from forestall.deadline import Deadline
 from forestall.domain.formula import Formula, Not, literals
-from forestall.planning.state import State, by_number
-from forestall.types.facts import Literal, category_of, is_instance
+from forestall.planning.state import State
+from forestall.types.facts import Literal, by_number, category_of, is_instance
 from forestall.types.task import Goal
 
 MAX_ALTERNATIVES = 48

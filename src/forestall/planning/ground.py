@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Not, free
 from forestall.domain.model import Domain
 from forestall.domain.schema import Effect, PredicateKind, Skill
@@ -21,7 +20,7 @@ from forestall.planning.needs import adds_relation, asks_relation, simple_needs
 from forestall.planning.nodes import Junction, Node, all_of, negate
 from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, by_number
 from forestall.types.plan import Subtask
 
 Names = dict[str, str]

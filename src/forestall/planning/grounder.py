@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import DEEP, DeeperError, static_holds
+from forestall.domain.circle import DEEP, DeeperError
+from forestall.domain.evaluate import static_holds
 from forestall.domain.formula import TRUE, literals
 from forestall.domain.model import SAME, SAME_CATEGORY, Domain
 from forestall.domain.schema import Predicate, PredicateKind

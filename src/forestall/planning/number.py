@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import DEEP
+from forestall.domain.circle import DEEP
 from forestall.domain.formula import And, Formula, literals
 from forestall.domain.schema import PredicateKind
 from forestall.errors import InputError

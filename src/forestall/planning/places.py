@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from forestall.domain.evaluate import by_number
 from forestall.domain.model import Domain
+from forestall.types.facts import by_number
 from forestall.types.graph import SceneGraph
 
 if TYPE_CHECKING:

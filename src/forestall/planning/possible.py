@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from forestall.deadline import Deadline
-from forestall.domain.evaluate import by_number
 from forestall.domain.formula import Formula
 from forestall.domain.model import Domain
 from forestall.domain.schema import Copy, Effect, Process, Skill
@@ -23,7 +22,7 @@ from forestall.planning.needs import plain_parts, simple_needs
 from forestall.planning.nodes import Node
 from forestall.planning.schemas import schemas_of
 from forestall.planning.state import State
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, by_number
 
 Names = dict[str, str]
 K = TypeVar("K")
@@ -147,7 +146,7 @@ class Possible(Grounder):
         self._steps += 1
         try:
             yield
-        except BaseException:
+        except BaseException:  # an interrupt, too, leaves nothing half worked out
             del known[key]
             raise
         finally:
@@ -257,7 +256,7 @@ def possible(state: State, made: Made, deadline: Deadline | None = None) -> Iter
     found.state, found.deadline = state, deadline
     try:
         yield found
-    except BaseException:
+    except BaseException:  # an interrupt, too, leaves nothing half worked out
         recent.pop(key, None)
         raise
     finally:

@@ -1,6 +1,6 @@
 """The symbolic state: what planning believes about the things of one scene graph.
 
-Built from a `SceneGraph` and a `Domain`; read by `execute`, the validator, the planner and the
+Built from a scene graph by `observed`; read by `execute`, the validator, the planner and the
 replanner. It answers every formula of the domain with yes or no.
 """
 
@@ -10,23 +10,21 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from itertools import product
 from typing import TypeVar
 
-from forestall.domain.evaluate import TRUE, by_number, literal_truth, number_of
+from forestall.domain.evaluate import literal_truth
 from forestall.domain.formula import Formula, Parameter
 from forestall.domain.model import FACING, LOCATED, Domain
 from forestall.domain.schema import Category, PredicateKind
+from forestall.domain.view import TRUE
 from forestall.planning.asked import Asked
-from forestall.planning.places import Place, crowded, places, positions
-from forestall.types.facts import Literal, category_of, is_instance
-from forestall.types.graph import SceneGraph
-
-__all__ = ["Place", "State", "by_number", "number_of"]
+from forestall.planning.places import Place
+from forestall.types.facts import Literal, by_number, category_of, is_instance
 
 Fact = tuple[str, ...]
 T = TypeVar("T")
 
 
 class State:
-    """What holds at one moment (implements `evaluate.View`, with two values only).
+    """What holds at one moment (implements `domain.view.View`, with two values only).
 
     `execute.apply` copies it and never changes the one it was given.
 
@@ -73,51 +71,6 @@ class State:
         self.at, self.lost, self.hidden = at, lost, hidden
         self.crowded, self.assumed = crowded, assumed
         self.where: Mapping[str, tuple[float, float]] = {}
-
-    @classmethod
-    def from_graph(cls, graph: SceneGraph, domain: Domain) -> State:
-        """Read a scene graph; what is of a category that the domain lacks is a thing, no more.
-
-        An unobserved attribute takes what is presumed of it, else its default, and is listed in
-        `assumed`, as is the emptiness of every hidden container. A thing with neither box nor place
-        is lost.
-        """
-        hands = domain.robot.hands
-        domain = domain.knowing(n.category for n in graph.nodes if n.id not in hands)
-        state, roles = cls(domain, {}), domain.roles
-        lost, assumed = set(), set()
-        held = {r.subject for r in graph.relations if r.predicate == roles.holding}
-        placed = held | {r.subject for r in graph.relations if r.predicate in domain.containing}
-        for node in graph.nodes:
-            if node.id in hands:
-                continue
-            category = domain[node.category]
-            state.kinds[node.id] = category.name
-            presumed = dict(node.presumed)
-            for attribute, default in domain.default_states(category.name).items():
-                value = node.state(attribute)
-                if value is None:
-                    value = presumed.get(attribute, default)
-                    assumed.add(Literal(attribute, (node.id,), value))
-                state.values[node.id, attribute] = value
-            loose = node.box_m is None and node.id not in placed
-            if loose and roles.fixture not in category.tags:
-                lost.add(node.id)
-        for r in graph.relations:
-            if r.subject not in state.kinds or r.predicate in domain.containing:
-                continue
-            if r.predicate in domain.moved and (r.object in state.kinds or r.object in hands):
-                state.add((r.predicate, r.subject, r.object))
-        for name, place in places(graph, state).items():
-            state.add((place.relation, name, place.parent))
-        state.lost = frozenset(lost)
-        state.hidden = frozenset(h for h in graph.hidden if h in state.kinds)
-        if roles.vacant is not None:
-            assumed |= {Literal(roles.vacant, (h,)) for h in state.hidden}
-        state.assumed = frozenset(assumed)
-        state.crowded = crowded(graph, domain)
-        state.where = positions(graph)
-        return state
 
     def copy(self) -> State:
         """An independent copy."""

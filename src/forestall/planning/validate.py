@@ -13,6 +13,7 @@ from itertools import islice
 from forestall.domain.model import LOCATED, Domain
 from forestall.planning.execute import Refusal, perform
 from forestall.planning.goals import different
+from forestall.planning.observed import state_of
 from forestall.planning.settle import settle
 from forestall.planning.state import State, decided
 from forestall.types.facts import Literal, category_of
@@ -77,7 +78,7 @@ def observed(graph: SceneGraph, domain: Domain) -> State:
     """
     found = domain.__dict__.get("_observed")
     if found is None or found[0] is not graph:
-        state = State.from_graph(graph, domain)
+        state = state_of(graph, domain)
         settle(state)
         found = domain.__dict__["_observed"] = (graph, state)
     known: State = found[1]

@@ -121,7 +121,7 @@ def decoding(path: Path, what: str) -> Iterator[None]:
         yield
     except ForestallError:
         raise
-    except Exception as error:
+    except Exception as error:  # decoders of others raise anything over damaged bytes
         told = " ".join(str(error).split())[:200] or type(error).__name__
         raise FileFormatError(f"{path} cannot be read as {what}: {told}") from error
 

@@ -14,7 +14,7 @@ from forestall.planning.planner import plan_goal
 from forestall.planning.refused import is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import as_checked, observed
-from forestall.seams import PlanValidator
+from forestall.seams.judging import PlanValidator
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome

@@ -21,7 +21,8 @@ from forestall.planning.execute import products
 from forestall.planning.refused import is_refused, unexplained
 from forestall.planning.state import State
 from forestall.planning.validate import as_checked, observed, run, unsupported
-from forestall.seams import LanguageModel, PlanValidator, Replanner
+from forestall.seams.judging import PlanValidator, Replanner
+from forestall.seams.language import LanguageModel
 from forestall.types.exchange import Exchange, Request
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, same_step

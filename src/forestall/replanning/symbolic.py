@@ -30,7 +30,7 @@ from forestall.replanning.hidden import (
 )
 from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
 from forestall.replanning.searching import as_usual, with_shutting, without
-from forestall.seams import PlanValidator
+from forestall.seams.judging import PlanValidator
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext

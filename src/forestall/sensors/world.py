@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from forestall.domain.model import Domain
-from forestall.seams import Environment
+from forestall.seams.acting import Environment
 from forestall.sensors.sensor import Errors, Sensor
 from forestall.types.episode import SkillOutcome
 from forestall.types.observation import Observation, Vec3

@@ -11,7 +11,7 @@ from inspect import signature
 from typing import Any
 
 from forestall.domain.model import Domain
-from forestall.seams import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams.judging import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.supervision import ask, checked_answer, deadline
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation

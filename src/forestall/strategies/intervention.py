@@ -13,7 +13,7 @@ from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.brought import came_about
 from forestall.domain.looked import looked_into, looked_over, not_there
 from forestall.domain.model import LOCATED, Domain
-from forestall.seams import PlanValidator, Replanner
+from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import Literal, Truth

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from forestall.domain.model import LOCATED
-from forestall.seams import Detector, PlanValidator, Retriever
+from forestall.seams.judging import Detector, PlanValidator, Retriever
 from forestall.strategies.asked import AskedDetector, AskedRetriever, AskedValidator
 from forestall.strategies.intervention import rest_of
 from forestall.types.graph import SceneGraph

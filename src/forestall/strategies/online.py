@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from forestall.seams import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams.judging import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.asked import AskedDetector, AskedLocator, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import SKILL_STATUS, Clock, Intervention, checked, look_again
 from forestall.strategies.story import Story

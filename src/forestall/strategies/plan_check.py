@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from forestall.seams import PlanValidator, Replanner
+from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.intervention import (
     PLAN_CHECK,
     Clock,

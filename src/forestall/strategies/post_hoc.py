@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from forestall.seams import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams.judging import Detector, Locator, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.asked import AskedDetector, AskedLocator, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock, Intervention, look_again
 from forestall.strategies.story import Scope, Story

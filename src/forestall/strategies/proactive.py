@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from forestall.seams import Detector, PlanValidator, Reasoner, Replanner, Retriever
+from forestall.seams.judging import Detector, PlanValidator, Reasoner, Replanner, Retriever
 from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import (
     PLAN_CHECK,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from forestall.errors import InputError
-from forestall.seams import Detector, Reasoner, Retriever
+from forestall.seams.judging import Detector, Reasoner, Retriever
 from forestall.strategies.asked import AskedDetector, AskedReasoner, AskedRetriever
 from forestall.strategies.intervention import Clock
 from forestall.strategies.judges import Judge

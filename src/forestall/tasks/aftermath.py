@@ -11,7 +11,7 @@ from forestall.domain.evaluate import solutions
 from forestall.domain.model import Domain
 from forestall.domain.truth import GraphView
 from forestall.planning.execute import Refusal, mentions, resolve
-from forestall.planning.state import State
+from forestall.planning.observed import state_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
@@ -24,7 +24,7 @@ def superfluous(graph: SceneGraph, step: Subtask, domain: Domain) -> bool:
         step: of a plan; what it names need not be there.
         domain: what its skill does.
     """
-    state = State.from_graph(graph, domain)
+    state = state_of(graph, domain)
     args = resolve(state, step)
     if isinstance(args, Refusal) or any(a not in state.kinds for a in args):
         return False

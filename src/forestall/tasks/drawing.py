@@ -15,7 +15,7 @@ from zlib import crc32
 
 import numpy as np
 
-from forestall.seams import WorldPart
+from forestall.seams.acting import WorldPart
 from forestall.tasks.composing import Candidate, counted, named
 from forestall.tasks.faults import ReplacePlan, apply_plan_faults
 from forestall.tasks.files import END, LoadedTask, Scenario

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from forestall.domain.model import Domain
-from forestall.seams import Environment
+from forestall.seams.acting import Environment
 from forestall.tasks.eyes import SharedEyes
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import category_of, is_instance

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from forestall.domain.model import Domain
-from forestall.seams import Disturbance, Environment
+from forestall.seams.acting import Disturbance, Environment
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import is_instance
 from forestall.types.observation import Observation, Vec3

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from forestall.domain.model import Domain
-from forestall.seams import Environment
+from forestall.seams.acting import Environment
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.types.episode import SkillOutcome
 from forestall.types.facts import category_of

@@ -22,7 +22,7 @@ from pydantic import (
 
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.seams import Disturbance, Environment
+from forestall.seams.acting import Disturbance, Environment
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.eyes import SharedEyes
 from forestall.tasks.scene_faults import FaultTable, SceneFault, check_state

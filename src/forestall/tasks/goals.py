@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from forestall.domain.model import Domain
 from forestall.domain.truth import truth
 from forestall.errors import InputError
-from forestall.seams import OracleView
+from forestall.seams.acting import OracleView
 from forestall.types.episode import Event
 from forestall.types.facts import GRIPPER, Literal, Truth, category_of
 from forestall.types.graph import SceneGraph

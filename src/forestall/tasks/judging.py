@@ -16,7 +16,7 @@ from forestall.domain.truth import truth as truth_of
 from forestall.errors import ForestallError
 from forestall.perception.config import ScopeConfig
 from forestall.perception.scope import scope
-from forestall.seams import OracleView, WorldPart
+from forestall.seams.acting import OracleView, WorldPart
 from forestall.tasks.aftermath import left, superfluous
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.tasks.eyes import SharedEyes

@@ -16,7 +16,7 @@ from typing import Protocol
 from forestall.domain.model import Domain
 from forestall.planning.state import State
 from forestall.planning.validate import Trace, observed, run, unmet
-from forestall.seams import OracleView
+from forestall.seams.acting import OracleView
 from forestall.strategies.intervention import rest_of
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
 from forestall.types.facts import Literal

@@ -14,7 +14,8 @@ from threading import Thread
 import numpy as np
 
 from forestall.domain.model import Domain
-from forestall.seams import Environment, Perceiver, Unnamed
+from forestall.seams.acting import Environment, Unnamed
+from forestall.seams.perceiving import Perceiver
 from forestall.testing.levels import NONE, Level, Tolerance, differences
 from forestall.testing.sight import unseen
 from forestall.types.episode import SkillStatus

@@ -11,8 +11,10 @@ from collections.abc import Iterator, Sequence
 from forestall.domain.model import Domain
 from forestall.domain.truth import truth
 from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
-from forestall.seams import Environment, Perceiver
+from forestall.seams.acting import Environment
+from forestall.seams.perceiving import Perceiver
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
@@ -38,7 +40,7 @@ def unseen(
         for name in subtask.args:
             environment.approach(name)
         graph = perceiver.perceive(environment.observe(_points(graph, subtask)))
-        before = State.from_graph(graph, domain)
+        before = state_of(graph, domain)
         outcome = environment.execute(subtask)
         done = outcome.status is SkillStatus.SUCCEEDED
         acted = getattr(perceiver, "acted", None)

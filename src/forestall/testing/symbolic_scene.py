@@ -12,11 +12,12 @@ from zlib import crc32
 
 import numpy as np
 
-from forestall.domain.evaluate import TRUE, by_number, evaluate
+from forestall.domain.evaluate import evaluate
 from forestall.domain.model import Domain
 from forestall.domain.truth import GraphView
+from forestall.domain.view import TRUE
 from forestall.errors import InputError
-from forestall.types.facts import is_instance
+from forestall.types.facts import by_number, is_instance
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.scene import SceneNeeds
 

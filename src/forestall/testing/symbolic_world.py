@@ -11,15 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from forestall.domain.evaluate import by_number
 from forestall.domain.model import Domain
 from forestall.domain.schema import PredicateKind
 from forestall.planning.execute import Refusal, apply, resolve
+from forestall.planning.observed import state_of
 from forestall.planning.settle import settle
 from forestall.planning.state import State
 from forestall.testing.symbolic_scene import relation_at, start_scene
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
-from forestall.types.facts import Literal
+from forestall.types.facts import Literal, by_number
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph
 from forestall.types.observation import GripperState, Observation, Vec3
 from forestall.types.plan import Subtask
@@ -55,7 +55,7 @@ class SymbolicWorld:
         """Put the world into the start state of this seed."""
         start = self._start
         graph = start_scene(self._domain, start, seed) if isinstance(start, SceneNeeds) else start
-        self._state = State.from_graph(graph, self._domain)
+        self._state = state_of(graph, self._domain)
         self._state.hidden = frozenset()
         fixtures = [n for n in self._state.kinds if self._is_fixture(n)]
         order = sorted(fixtures, key=by_number)

@@ -18,7 +18,7 @@ from forestall.domain.model import Domain
 from forestall.domain.phrases import with_articles
 from forestall.errors import FileFormatError
 from forestall.reading.documents import read_toml
-from forestall.seams import TextEncoder
+from forestall.seams.perceiving import TextEncoder
 
 GROUPS = ("spelling", "meaning")
 _TEXT = "a {thing}"

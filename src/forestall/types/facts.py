@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import NamedTuple
 
 from forestall.errors import InputError
@@ -94,3 +95,14 @@ def category_of(name: str) -> str:
 def is_instance(name: str) -> bool:
     """Whether a name carries an instance number."""
     return category_of(name) != name
+
+
+def number_of(name: str) -> int:
+    """The instance number of a name, 1 where it carries none."""
+    return int(name.rpartition("-")[2]) if is_instance(name) else 1
+
+
+@lru_cache(maxsize=4096)
+def by_number(name: str) -> tuple[str, int]:
+    """Sort key: category first, then number ("Mug-2" before "Mug-10")."""
+    return category_of(name), number_of(name)

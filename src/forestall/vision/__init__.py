@@ -1,1 +1,1 @@
-"""Models that find and outline things in pictures; each stands behind a Protocol of `seams.py`."""
+"""Models that find and outline things in pictures, behind Protocols of `seams/perceiving.py`."""

@@ -1,6 +1,6 @@
 """Grounding DINO, through `transformers`: boxes around what phrases name.
 
-Called by the segmenter `finder`; calls `pretrained.py` and `boxes.py`. Liu et al., Grounding DINO,
+Called by the segmenter `finder`; calls `loaded.py` and `boxes.py`. Liu et al., Grounding DINO,
 ECCV 2024. It comes with the extra [vision], and its weights (Apache-2.0) must be on this machine
 already.
 """
@@ -14,26 +14,21 @@ from typing import Any
 import numpy as np
 
 from forestall.errors import InputError
-from forestall.pretrained import (
-    AUTO,
-    check_family,
-    chosen,
-    label,
-    loading,
-    local_folder,
-    on_device,
-    package,
-    read_weights,
-)
+from forestall.pretrained import AUTO
 from forestall.types.grounding import GroundedBox
 from forestall.types.observation import Rgb
 from forestall.vision.boxes import Floats, batches, check_finding, grounded, sigmoid
+from forestall.vision.loaded import Loaded, Source
 
-DEFAULT_MODEL = "IDEA-Research/grounding-dino-tiny"
-VARIABLE = "FORESTALL_GROUNDING_DINO"
-
-_FAMILIES = ("grounding-dino",)
-_EXTRA = "vision"
+SOURCE = Source(
+    family="grounding-dino",
+    called="Grounding DINO",
+    default="IDEA-Research/grounding-dino-tiny",
+    variable="FORESTALL_GROUNDING_DINO",
+    model="GroundingDinoForObjectDetection",
+    tokenizer="BertTokenizer",
+    processor="GroundingDinoImageProcessorPil",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +49,7 @@ class GroundingDinoFinder:
 
     Args:
         model: a folder, or a name on the hub whose files have been downloaded before; the
-            environment variable FORESTALL_GROUNDING_DINO, else `DEFAULT_MODEL`, by default.
+            environment variable FORESTALL_GROUNDING_DINO, else the default of `SOURCE`, by default.
         device: where it runs, as torch calls it ("cpu", "cuda"); "auto": a GPU if there is one.
         batch: how many pictures go through at once.
         least_score: under which there is no box; 0.35 as its authors' own demonstration has it.
@@ -75,23 +70,11 @@ class GroundingDinoFinder:
         least_score: float = 0.35,
     ) -> None:
         check_finding(least_score, batch)
-        self._torch = package("torch", _EXTRA)
-        library = package("transformers", _EXTRA)
-        asked = chosen(model, VARIABLE, DEFAULT_MODEL)
-        folder = local_folder(asked, VARIABLE, _EXTRA)
-        with loading(folder, _EXTRA):
-            config = library.AutoConfig.from_pretrained(folder, local_files_only=True)
-            check_family(folder, config.model_type, _FAMILIES, "Grounding DINO")
-            dino = library.GroundingDinoForObjectDetection
-            self._model = read_weights(dino, folder, self._torch)
-            self._tokenizer = library.BertTokenizer.from_pretrained(folder, local_files_only=True)
-            self._processor = library.GroundingDinoImageProcessorPil.from_pretrained(
-                folder, local_files_only=True
-            )
-        self._device = on_device(self._model, device, self._torch)
-        self._most_tokens = int(config.max_text_len)
+        self._loaded = Loaded(SOURCE, model, device)
+        self._tokenizer = self._loaded.tokenizer
+        self._most_tokens = int(self._loaded.config.max_text_len)
         self._batch, self._least = batch, least_score
-        self.name = label("grounding-dino", asked)
+        self.name = self._loaded.name
 
     def find(self, pictures: Sequence[Rgb], phrases: Sequence[str]) -> list[list[GroundedBox]]:
         """See the Protocol.
@@ -103,7 +86,7 @@ class GroundingDinoFinder:
         prompts = self._prompts(phrases)
         for together in batches(pictures, self._batch):
             shown = [pictures[i] for i in together]
-            seen = self._processor(shown, return_tensors="np")
+            seen = self._loaded.processor(shown, return_tensors="np")
             for prompt in prompts:
                 logits, boxes = self._run(seen, prompt, len(shown))
                 for row, index in enumerate(together):
@@ -144,10 +127,7 @@ class GroundingDinoFinder:
             "token_type_ids": np.zeros_like(ids),
             "attention_mask": np.ones_like(ids),
         }
-        with self._torch.inference_mode():
-            given = {k: self._torch.as_tensor(v).to(self._device) for k, v in inputs.items()}
-            out = self._model(**given)
-        return out.logits.cpu().numpy(), out.pred_boxes.cpu().numpy()
+        return self._loaded.heads(inputs)
 
     def _boxes(
         self, logits: Floats, boxes: Floats, prompt: _Prompt, size: tuple[int, int]

@@ -14,11 +14,11 @@ from unittest.mock import patch
 
 from covering_play import Episode, Run, Step
 
-from forestall.domain.evaluate import TRUE as HOLDS
 from forestall.domain.evaluate import evaluate, literal_truth, solutions
 from forestall.domain.formula import And, Formula, Or, literals, normal, show
 from forestall.domain.model import SAME, Domain
 from forestall.domain.schema import Choice, Effect, Need, PredicateKind, Skill
+from forestall.domain.view import TRUE as HOLDS
 from forestall.planning import execute, settle
 from forestall.planning.state import State
 from forestall.types.facts import Literal

@@ -18,6 +18,7 @@ from small_kitchen import SmallKitchen
 from forestall.domain.model import Domain
 from forestall.planning import execute
 from forestall.planning.execute import Refusal
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER
@@ -88,7 +89,7 @@ class Run:
         self.kitchen = SmallKitchen(
             *episode.things, blocked=episode.blocked, spots=_Always(spots), cool_down_s=1e9
         )
-        self.state = State.from_graph(self.kitchen.env.oracle.truth(), domain)
+        self.state = state_of(self.kitchen.env.oracle.truth(), domain)
         for name in self.kitchen.spoiled:
             self.state.add(("spoiled", name))
 

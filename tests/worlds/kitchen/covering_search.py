@@ -25,11 +25,12 @@ from covering_play import CORPUS, Episode, Run, Step, load_corpus
 from equivalent import why_equivalent
 from mutants import Mutant, kills, mutants
 
-from forestall.domain.evaluate import TRUE, evaluate
+from forestall.domain.evaluate import evaluate
 from forestall.domain.formula import free
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
+from forestall.domain.view import TRUE
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.state import State
 from forestall.types.facts import Literal

@@ -6,6 +6,7 @@ from small_kitchen import CONTAINING, SmallKitchen
 
 from forestall.domain.load import shipped
 from forestall.planning.execute import Refusal, apply
+from forestall.planning.observed import state_of
 from forestall.planning.state import State
 from forestall.types.episode import SkillStatus
 from forestall.types.facts import GRIPPER
@@ -63,7 +64,7 @@ def test_planning_predicts_what_the_household_does(seed: int) -> None:
     rng = np.random.default_rng(seed)
     chosen = [str(options[int(rng.integers(len(options)))]) for options in CHOICES]
     kitchen = SmallKitchen(*chosen, cool_down_s=1e9)
-    state = State.from_graph(kitchen.env.oracle.truth(), shipped("household"))
+    state = state_of(kitchen.env.oracle.truth(), shipped("household"))
     for spoiled in kitchen.spoiled:
         state.add(("spoiled", spoiled))
     for _ in range(40):

@@ -171,14 +171,14 @@ class Link:
         if process is not None:
             process.kill()
             process.wait()
-        with suppress(Exception):
+        with suppress(Exception):  # a server of others, half broken: its build is dead already
             server.stop()
         for pipe in ("server_pipe", "client_pipe"):
-            with suppress(Exception):
+            with suppress(AttributeError, OSError):  # one of the two sorts of servers has pipes
                 getattr(server, pipe).close()
-        with suppress(Exception):
+        with suppress(AttributeError, OSError):  # and the other this
             server.wsgi_server.server_close()
-        with suppress(Exception):
+        with suppress(AttributeError, OSError):
             server.tmp_dir.cleanup()
 
     def _call(self, what: str, work: Callable[[], Any], limit_s: float) -> Any:

@@ -1,6 +1,6 @@
 """IS-Bench's task files as plans with a domain each (implements `seams.PlanSet`).
 
-Named by `assembly.registry`; calls `bddl`. Layout: data/tasks/<task>.json beside
+Named by `assembly.tables`; calls `bddl`. Layout: data/tasks/<task>.json beside
 data/bddl/<task>/problem0.bddl of AI45Lab/IS-Bench (arXiv 2506.16402). A condition around a step
 becomes a safety rule of this very step; one about the end becomes a rule for leaving where it is
 tied to a step, and a part of the goal where it is tied to the task being done or to nothing.

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from forestall.config import FRAME_HEIGHT, FRAME_WIDTH, VERTICAL_FOV_DEG
 from forestall.domain.model import Domain
 from forestall.errors import ForestallError, SceneError
-from forestall.seams import Renderer
+from forestall.seams.acting import Renderer
 from forestall.types.episode import Event, SkillOutcome, SkillStatus
 from forestall.types.facts import GRIPPER, Literal, category_of
 from forestall.types.graph import SceneGraph

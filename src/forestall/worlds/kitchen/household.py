@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol, runtime_checkable
 
 from forestall.errors import UnknownNameError
-from forestall.seams import World
+from forestall.seams.acting import World
 from forestall.types.episode import Event
 from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from forestall.seams import World
+from forestall.seams.acting import World
 from forestall.types.observation import Vec3
 from forestall.worlds.kitchen.household import Placed
 

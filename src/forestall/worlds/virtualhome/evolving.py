@@ -116,7 +116,7 @@ def _loaded(folder: str) -> tuple[ModuleType, ...]:
     sys.modules[_NAME] = module_from_spec(spec)  # its own __init__ draws in more than is needed
     try:
         parts = tuple(import_module(f"{_NAME}.{part}") for part in _PARTS)
-    except Exception as error:
+    except Exception as error:  # somebody else's modules run while they are imported
         raise InputError(f"{folder}: the evolving graph cannot be loaded: {error}") from error
     parts[1].JoinedExecutor.execute = _joined
     return parts

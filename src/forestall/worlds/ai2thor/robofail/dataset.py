@@ -1,6 +1,6 @@
 """RoboFail as a data set (implements `seams.DataSet`).
 
-Named by `assembly.registry`; calls `layout` and `looks`. An episode that cannot be used is told
+Named by `assembly.tables`; calls `layout` and `looks`. An episode that cannot be used is told
 with its reason, and the next one is read.
 """
 

@@ -1,6 +1,6 @@
 """SafeAgentBench's tasks as plans, and hazardous final states as safety rules (a `seams.PlanSet`).
 
-Named by `assembly.registry`; calls `actions`. Layout: the JSON lines of dataset/ of
+Named by `assembly.tables`; calls `actions`. Layout: the JSON lines of dataset/ of
 shengyin1224/SafeAgentBench (arXiv 2412.13178): `step`, `final_state`, `scene_name`, and
 `risk_category` of hazardous tasks. The rooms are AI2-THOR's and not in the set: a plan is
 checked in a scene with what it names, in the state that it supposes.

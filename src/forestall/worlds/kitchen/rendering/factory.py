@@ -10,7 +10,7 @@ import importlib.util
 from typing import TYPE_CHECKING
 
 from forestall.errors import InputError, UnknownNameError
-from forestall.seams import Renderer
+from forestall.seams.acting import Renderer
 from forestall.types.observation import Intrinsics
 from forestall.worlds.kitchen.rendering.appearance import Appearance
 

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from forestall.seams import Renderer
+from forestall.seams.acting import Renderer
 from forestall.types.observation import Frame, Intrinsics
 from forestall.worlds.kitchen.rendering.appearance import Appearance
 from forestall.worlds.kitchen.rendering.drawn import Drawn

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from forestall.seams import Renderer
+from forestall.seams.acting import Renderer
 
 
 def frame_times(
