@@ -162,7 +162,7 @@ def test_variances_are_those_that_answers_were_drawn_with() -> None:
 
 
 def test_true_numbers_are_those_of_very_many_answers() -> None:
-    study = study_of(300, Design(200, 200, seed=3))
+    study = study_of(150, Design(100, 150, seed=3))
     data = summary(study, simulate(study, TASTE, seed=3))
     for name in AGAINST:
         assert data["against"][name]["wins"]["value"] == pytest.approx(TASTE.wins(name), abs=0.04)

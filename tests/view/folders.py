@@ -55,7 +55,8 @@ def begin_experiment(folder: Path, wanted: int, before: int | None = None) -> No
         "python": "3",
         "date": "2026-01-01",
     }
-    call |= {} if before is None else {"before": before}
+    if before is not None:
+        call["before"] = before
     effort = {**call, "episodes": 0, "seconds": 0.0, "asked": [{**asked, "episodes": wanted}]}
     folder.mkdir(parents=True)
     (folder / "experiment.json").write_text(json.dumps({"kind": "experiment", "split": "dev"}))

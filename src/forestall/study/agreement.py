@@ -14,7 +14,10 @@ _MOST_STEPS = 10_000
 _CLOSE = 1e-10
 
 
-def alphas(counts: NDArray[np.float64]) -> NDArray[np.float64]:
+Floats = NDArray[np.float64]
+
+
+def alphas(counts: Floats) -> Floats:
     """Nominal alpha: 1 where all agree, 0 where they agree as often as chance.
 
     Args:
@@ -24,16 +27,35 @@ def alphas(counts: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         (...,) NaN where fewer than two values stand beside another, or all of them are the same.
     """
-    of_unit = counts.sum(axis=-1)
-    several = of_unit > 1
-    pairs = of_unit**2 - (counts**2).sum(axis=-1)
-    differ = np.where(several, pairs / np.where(several, of_unit - 1, 1), 0).sum(axis=-1)
-    totals = (counts * several[..., None]).sum(axis=-2)
-    all_of_them = totals.sum(axis=-1)
-    expected = all_of_them**2 - (totals**2).sum(axis=-1)
+    differ, paired = disagreement(counts)
+    return alpha_from(differ.sum(axis=-1), paired.sum(axis=-2))
+
+
+def disagreement(counts: Floats) -> tuple[Floats, Floats]:
+    """What alpha needs of each unit (..., values).
+
+    Returns:
+        (...,) how much its values differ; (..., values) those that stand beside another.
+    """
+    number = counts.sum(axis=-1)
+    several = number > 1
+    pairs = number**2 - (counts**2).sum(axis=-1)
+    return np.where(several, pairs / np.where(several, number - 1, 1), 0), counts * several[
+        ..., None
+    ]
+
+
+def alpha_from(differ: Floats, paired: Floats) -> Floats:
+    """Alpha from sums over units.
+
+    Args:
+        differ: (...,) see `disagreement`.
+        paired: (..., values) likewise.
+    """
+    number = paired.sum(axis=-1)
+    expected = number**2 - (paired**2).sum(axis=-1)
     defined = expected > 0
-    share = differ / np.where(defined, expected, 1)
-    return np.where(defined, 1 - (all_of_them - 1) * share, np.nan)
+    return np.where(defined, 1 - (number - 1) * differ / np.where(defined, expected, 1), np.nan)
 
 
 def strengths(wins: NDArray[np.float64]) -> NDArray[np.float64] | None:

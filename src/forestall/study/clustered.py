@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forestall.statistics.intervals import EXACT, LEVEL, NOTHING, Metric
-from forestall.study.agreement import alphas
+from forestall.study.agreement import alpha_from, alphas, disagreement
 
 CLUSTERED = "clustered by rater and item"
 """Method of an interval."""
@@ -138,10 +138,15 @@ def alpha_of(values: Sequence[Hashable], units: Sequence[Hashable], clusters: Cl
 def _without_one(counts: Floats, found: float) -> float:
     """Variance of alpha by leaving out one answer at a time; equal ones are left out but once."""
     units, values = np.nonzero(counts)
-    less = np.repeat(counts[None], len(units), axis=0)
-    less[np.arange(len(units)), units, values] -= 1
+    less = counts[units]
+    less[np.arange(len(units)), values] -= 1
+    differ, paired = disagreement(counts)
+    differ_less, paired_less = disagreement(less)
+    without = alpha_from(
+        differ.sum() - differ[units] + differ_less, paired.sum(axis=0) - paired[units] + paired_less
+    )
     n = float(counts.sum())
-    return float((counts[units, values] * (alphas(less) - found) ** 2).sum()) * (n - 1) / n
+    return float((counts[units, values] * (without - found) ** 2).sum()) * (n - 1) / n
 
 
 def codes(values: Sequence[Hashable]) -> Ints:
