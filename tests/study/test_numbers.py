@@ -166,5 +166,5 @@ def test_true_numbers_are_those_of_very_many_answers() -> None:
     data = summary(study, simulate(study, TASTE, seed=3))
     for name in AGAINST:
         assert data["against"][name]["wins"]["value"] == pytest.approx(TASTE.wins(name), abs=0.04)
-    assert data["against"]["all"]["both"]["value"] == pytest.approx(TASTE.both, abs=0.02)
-    assert data["alpha"]["value"] == pytest.approx(TASTE.alpha(), abs=0.015)
+    assert data["against"]["all"]["both"]["value"] == pytest.approx(TASTE.both, abs=0.035)
+    assert data["alpha"]["value"] == pytest.approx(TASTE.alpha(), abs=0.04)
