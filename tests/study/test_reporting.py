@@ -59,7 +59,9 @@ def test_the_report_has_every_number(tmp_path: Path) -> None:
             == (row["wins"]["n"])
         )
     assert found["against"]["image"]["verdict"] == "better"
-    assert 0 < found["alpha"]["value"] < 0.5 and found["alpha"]["comparisons"] == 120
+    alpha = found["alpha"]
+    assert 0 < alpha["value"] < 0.5 and alpha["low"] < alpha["value"] < alpha["high"]
+    assert found["alpha"]["comparisons"] == 120
     assert found["power"]["variance"]["assumed"] is False and data["paper"]["raters"] == 15
     page = (tmp_path / "out" / "report.html").read_text()
     assert "http" not in page and "<script" not in page and len(page) < 50_000

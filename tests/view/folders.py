@@ -45,10 +45,18 @@ def make(folder: Path) -> None:
     (experiment / "tables" / "a.csv").write_text("a,b\n")
 
 
-def begin_experiment(folder: Path, wanted: int) -> None:
-    """An experiment of which no episode is finished yet."""
+def begin_experiment(folder: Path, wanted: int, before: int | None = None) -> None:
+    """An experiment of which no episode is finished yet, whose call says what was there before."""
     asked = {"set": "robofail", "profile": "kind", "strategy": "watch", "setup": "watch"}
-    call = {"jobs": 2, "engine": "local", "machine": "m", "python": "3", "date": "2026-01-01"}
+    call: dict[str, object] = {
+        "jobs": 2,
+        "engine": "local",
+        "machine": "m",
+        "python": "3",
+        "date": "2026-01-01",
+    }
+    if before is not None:
+        call["before"] = before
     effort = {**call, "episodes": 0, "seconds": 0.0, "asked": [{**asked, "episodes": wanted}]}
     folder.mkdir(parents=True)
     (folder / "experiment.json").write_text(json.dumps({"kind": "experiment", "split": "dev"}))

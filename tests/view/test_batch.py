@@ -15,6 +15,7 @@ from forestall.records.beside import folder_beside
 from forestall.records.record import write_record
 from forestall.view.batch import NEWEST, batch_of
 from forestall.view.index import Index
+from forestall.view.pages import environment
 from report import records
 
 from .folders import add_episode, ask, begin_experiment, shown
@@ -35,6 +36,43 @@ def test_how_far_an_experiment_has_come(tmp_path: Path) -> None:
     assert [(a.set, a.episodes) for a in batch.asked] == [("robofail", 40)]
     (row,) = Index(tmp_path).now().experiments.values()
     assert (row.episodes, row.wanted) == (NEWEST + 5, 40)
+
+
+def written(folder: Path, began_s: float, last_s: float) -> None:
+    """Date the call's beginning and its newest episode."""
+    for name, at in (("effort.jsonl", began_s), ("episodes.jsonl", last_s)):
+        os.utime(folder / name, (at, at))
+
+
+def test_the_time_left_goes_by_the_pace_of_the_call(tmp_path: Path) -> None:
+    folder, now = tmp_path / "batch", time.time()
+    begin_experiment(folder, 12, before=2)
+    for seed in range(2):  # of an earlier call
+        add_episode(folder, seed=seed)
+    written(folder, now - 600, now - 7000)
+    assert batch_of(folder).left_s is None
+    for seed in range(2, 6):
+        add_episode(folder, seed=seed)
+    written(folder, now - 600, now - 120)
+    assert batch_of(folder).left_s == pytest.approx(6 * 480 / 4)
+    assert batch_of(folder, busy=False).left_s is None
+    with shown(tmp_path) as server, alone(folder):
+        assert "6 of 12 episodes, about 12 min left" in ask(server, "/experiment/batch/")[1]
+
+
+def test_without_a_note_of_the_beginning_no_time_is_told(tmp_path: Path) -> None:
+    begin_experiment(tmp_path / "batch", 3)
+    add_episode(tmp_path / "batch")
+    written(tmp_path / "batch", 1e9, 1e9 + 60)
+    assert batch_of(tmp_path / "batch").left_s is None
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0, "less than a minute"), (29, "less than a minute"), (95, "2 min"), (7300, "2 h 2 min")],
+)
+def test_an_estimate_is_said_in_no_finer_units(seconds: float, said: str) -> None:
+    assert environment().filters["roughly"](seconds) == said
 
 
 def test_damage_is_told(tmp_path: Path) -> None:

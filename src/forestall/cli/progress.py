@@ -6,6 +6,9 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+_PACE_S = 3600.0
+"""The time left goes by the steps of so long: an episode may take minutes."""
+
 
 @contextmanager
 def bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[int, int, str], None]]:
@@ -33,6 +36,7 @@ def bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[int, int, str]
         TimeElapsedColumn(),
         TimeRemainingColumn(),
         console=Console(file=sys.stderr),
+        speed_estimate_period=_PACE_S,
     )
     row = progress.add_task(title, total=None)
 

@@ -162,7 +162,7 @@ def _writer(llm: str | None) -> Writer | None:
 
 def _say(who: str, found: dict[str, Any]) -> None:
     from forestall.cli.listing import print_table, say
-    from forestall.study.reporting import table_of
+    from forestall.study.reporting import number, table_of
 
     say(
         f"{who}: {found['raters']} raters ({found['finished']} finished, {found['not_attentive']} "
@@ -171,8 +171,7 @@ def _say(who: str, found: dict[str, Any]) -> None:
     if "against" not in found:
         return
     print_table(*table_of(found))
-    alpha = found["alpha"]["value"]
-    told = "not defined" if alpha is None else f"{alpha:.2f}"
+    told = "not defined" if found["alpha"]["value"] is None else number(found["alpha"])
     say(f"Krippendorff's alpha {told} over {found['alpha']['comparisons']} comparisons")
     _say_needed(found["power"])
 

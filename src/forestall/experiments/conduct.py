@@ -112,6 +112,7 @@ def conduct(
     with folder.alone():
         rows = folder.open(experiment.about())
         todo = [r for r in runs if r.key not in rows]
+        before = len(runs) - len(todo)
         if todo:
             if announce is not None:
                 announce(_cost(todo, experiment))
@@ -120,9 +121,9 @@ def conduct(
                 ((run.case.set, run.setup) for run in runs),
                 experiment.workers,
                 experiment.engine,
+                before,
             ) as count:
                 (demonstrate or _demonstrations)(todo, experiment, progress)
-                before = len(runs) - len(todo)
                 progress(before, len(runs), "episodes")
                 for done, row in enumerate(_computed(todo, rows, folder, experiment, compute), 1):
                     count(done)

@@ -204,7 +204,12 @@ class ResultsFolder(Generic[R]):
 
     @contextmanager
     def effort_of(
-        self, choice: Any, asked: Iterable[tuple[str, Setup]], workers: int, engine: str
+        self,
+        choice: Any,
+        asked: Iterable[tuple[str, Setup]],
+        workers: int,
+        engine: str,
+        before: int = 0,
     ) -> Iterator[Callable[[int], None]]:
         """Write down what a call of the command was for, and at its end what it did and where.
 
@@ -213,6 +218,7 @@ class ResultsFolder(Generic[R]):
             asked: set and setup of every episode that this means, those that are there included.
             workers: how many at once.
             engine: of what kind.
+            before: how many of the episodes are there already.
 
         Yields:
             What is to be told how many episodes are done.
@@ -229,6 +235,7 @@ class ResultsFolder(Generic[R]):
                 }
                 for (of, setup), count in Counter(asked).items()
             ],
+            "before": before,
             "jobs": workers,
             "engine": engine,
             "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.platform()}",
@@ -274,6 +281,14 @@ class ResultsFolder(Generic[R]):
             if before is None or before.episodes < asked.episodes:
                 most[asked.set, asked.setup] = asked
         return list(most.values())
+
+    def begun_with(self) -> int | None:
+        """How many episodes were there when the call began that has not come to an end.
+
+        None where there is no such call, or it did not write that down.
+        """
+        calls = self._calls(ExperimentCall)
+        return calls[-1].before if calls and not calls[-1].seconds else None
 
     def _calls(self, model: type[C]) -> list[C]:
         file = self.path / EFFORT

@@ -89,9 +89,15 @@ class Call(_Model):
 
 
 class ExperimentCall(Call):
-    """The same of one of the paper's experiments, with what it was for."""
+    """The same of one of the paper's experiments, with what it was for.
+
+    Args:
+        asked: what it wanted.
+        before: how many of these episodes were there when it began, None where nobody wrote that.
+    """
 
     asked: list[Asked]
+    before: int | None = Field(default=None, ge=0)
 
 
 def lines_of(file: Path) -> tuple[list[tuple[str, Any]], str, str]:

@@ -7,9 +7,6 @@ Bradley-Terry models" (Annals of Statistics 2004).
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Hashable, Mapping, Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,32 +14,48 @@ _MOST_STEPS = 10_000
 _CLOSE = 1e-10
 
 
-def alpha(units: Mapping[Hashable, Sequence[Hashable]]) -> float | None:
+Floats = NDArray[np.float64]
+
+
+def alphas(counts: Floats) -> Floats:
     """Nominal alpha: 1 where all agree, 0 where they agree as often as chance.
 
     Args:
-        units: what was judged → the values that it was given, each by another rater.
+        counts: (..., units, values) how often each thing that was judged was given each value, each
+            time by another rater.
 
     Returns:
-        None where fewer than two values stand beside another, or all of them are the same.
+        (...,) NaN where fewer than two values stand beside another, or all of them are the same.
     """
-    coincidences: Counter[tuple[Hashable, Hashable]] = Counter()
-    for values in units.values():
-        if len(values) < 2:
-            continue
-        counts = Counter(values)
-        for a, n in counts.items():
-            for b, m in counts.items():
-                coincidences[a, b] += n * (m - (a == b)) / (len(values) - 1)  # type: ignore[assignment]
-    totals: Counter[Hashable] = Counter()
-    for (a, _), n in coincidences.items():
-        totals[a] += n
-    n_all = sum(totals.values())
-    expected = n_all**2 - sum(n**2 for n in totals.values())
-    if n_all < 2 or expected <= 0:
-        return None
-    observed = sum(n for (a, b), n in coincidences.items() if a != b)
-    return 1 - (n_all - 1) * observed / expected
+    differ, paired = disagreement(counts)
+    return alpha_from(differ.sum(axis=-1), paired.sum(axis=-2))
+
+
+def disagreement(counts: Floats) -> tuple[Floats, Floats]:
+    """What alpha needs of each unit (..., values).
+
+    Returns:
+        (...,) how much its values differ; (..., values) those that stand beside another.
+    """
+    number = counts.sum(axis=-1)
+    several = number > 1
+    pairs = number**2 - (counts**2).sum(axis=-1)
+    return np.where(several, pairs / np.where(several, number - 1, 1), 0), counts * several[
+        ..., None
+    ]
+
+
+def alpha_from(differ: Floats, paired: Floats) -> Floats:
+    """Alpha from sums over units.
+
+    Args:
+        differ: (...,) see `disagreement`.
+        paired: (..., values) likewise.
+    """
+    number = paired.sum(axis=-1)
+    expected = number**2 - (paired**2).sum(axis=-1)
+    defined = expected > 0
+    return np.where(defined, 1 - (number - 1) * differ / np.where(defined, expected, 1), np.nan)
 
 
 def strengths(wins: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -1,25 +1,24 @@
 """What raters' answers come to: shares with intervals, agreement, strengths, what could be found.
 
-Called by `reporting.py` and by whoever wants the numbers; calls statistics. Two answers of one
-rater are not independent, nor are two about one item, and intervals go by that. The pigeonhole
-bootstrap of `statistics/intervals.py` counts what differs from answer to answer three times: here
-its intervals hold the truth in 99 % of simulated studies, these in 96 to 97 %.
+Called by `reporting.py` and by whoever wants the numbers; calls `clustered.py`, whose intervals go
+by rater and by item.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from forestall.statistics.intervals import EXACT, LEVEL, NOTHING, Metric
-from forestall.study.agreement import alpha, strengths
+from forestall.statistics.intervals import Metric
+from forestall.study.agreement import strengths
 from forestall.study.answers import Rater
+from forestall.study.clustered import Clusters, alpha_of, share_of
 from forestall.study.model import Study
 from forestall.study.power import ASSUMED, Variance, detectable, raters_needed, variance_of
 
@@ -29,9 +28,6 @@ LEAST_CHECKS = 2 / 3
 ALL = "all"
 DIFFERENCES = (0.05, 0.1, 0.15, 0.2, 0.25)
 RATERS = (5, 10, 15, 20, 30, 60)
-
-CLUSTERED = "clustered by rater and item"
-"""Method of an interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,65 +91,19 @@ def shares(found: Sequence[Comparison], against: Sequence[str]) -> dict[str, dic
     for name in (*against, ALL):
         mine = [c for c in found if name in (c.against, ALL)]
         decided = [c for c in mine if c.score != 0.5]
+        by, by_decided = _clusters(mine), _clusters(decided)
         table[name] = {
-            "wins": share_of(mine, [c.score == 1 for c in mine]),
-            "losses": share_of(mine, [c.score == 0 for c in mine]),
-            "both": share_of(mine, [c.score == 0.5 for c in mine]),
-            "decided": share_of(decided, [c.score == 1 for c in decided]),
-            "preference": share_of(mine, [c.score for c in mine]),
+            "wins": share_of([c.score == 1 for c in mine], by),
+            "losses": share_of([c.score == 0 for c in mine], by),
+            "both": share_of([c.score == 0.5 for c in mine], by),
+            "decided": share_of([c.score == 1 for c in decided], by_decided),
+            "preference": share_of([c.score for c in mine], by),
         }
     return table
 
 
-def share_of(found: Sequence[Comparison], values: Sequence[float]) -> Metric:
-    """The mean of values from 0 to 1 with its 95 % interval, clustered by rater and by item.
-
-    Variances of both clusterings are added, and that of single answers, which is in both, is taken
-    off (Cameron, Gelbach and Miller, "Robust inference with multiway clustering", 2011); Student's
-    t with one degree of freedom fewer than there are raters or items, whichever are fewer; on the
-    logit scale, so that no end lies outside. A share of 0 or 1 has the exact interval of as many
-    answers as there are raters or items.
-
-    Args:
-        found: the answers.
-        values: one of each.
-    """
-    from scipy.special import expit, logit
-    from scipy.stats import binomtest, t
-
-    n = len(found)
-    if n == 0:
-        return NOTHING
-    y = np.asarray(values, float)
-    mean = float(y.mean())
-    whole = bool(np.isin(y, (0.0, 1.0)).all())
-    count = round(float(y.sum())) if whole else None
-    raters, items = _codes([c.rater for c in found]), _codes([c.item for c in found])
-    groups = min(int(raters.max()), int(items.max())) + 1
-    if groups < 2:
-        return Metric(mean, None, None, n, count=count)
-    if mean in (0.0, 1.0):
-        exact = binomtest(round(mean * groups), groups).proportion_ci(LEVEL)
-        return Metric(mean, float(exact.low), float(exact.high), n, EXACT, count)
-    rest = (y - mean) / n
-    by_rater, by_item = _spread(rest, raters), _spread(rest, items)
-    alone = float((rest**2).sum())
-    variance = max(by_rater + by_item - alone, by_rater, by_item)
-    reach = float(t.ppf((1 + LEVEL) / 2, groups - 1)) * variance**0.5 / (mean * (1 - mean))
-    middle = float(logit(mean))
-    low, high = expit([middle - reach, middle + reach])
-    return Metric(mean, float(low), float(high), n, CLUSTERED, count)
-
-
-def _codes(values: Sequence[Hashable]) -> NDArray[np.int64]:
-    codes = {v: k for k, v in enumerate(dict.fromkeys(values))}
-    return np.array([codes[v] for v in values], np.int64)
-
-
-def _spread(rest: NDArray[np.float64], groups: NDArray[np.int64]) -> float:
-    """Variance of a mean from the sums of its residuals over whole groups."""
-    count = int(groups.max()) + 1
-    return float((np.bincount(groups, rest) ** 2).sum()) * count / (count - 1)
+def _clusters(found: Sequence[Comparison]) -> Clusters:
+    return Clusters.of([c.rater for c in found], [c.item for c in found])
 
 
 def summary(study: Study, raters: Sequence[Rater]) -> dict[str, Any]:
@@ -183,7 +133,7 @@ def summary(study: Study, raters: Sequence[Rater]) -> dict[str, Any]:
         all_of_them = shares(everybody, study.against)[ALL]["preference"]
         data["preference_of_all_raters"] = all_of_them.to_json()
     data["alpha"] = _alpha(found)
-    data["strengths"] = _strengths(study, found)
+    data["strengths"] = _strengths(study, found, table)
     decided = [c.first for c in found if c.first is not None]
     seconds = [c.seconds for c in found if c.seconds is not None]
     data["side_a"] = sum(decided) / len(decided) if decided else None
@@ -239,15 +189,14 @@ def _odds(preference: Metric) -> dict[str, float | None]:
     def odds(share: float | None) -> float | None:
         return None if share is None or not 0 < share < 1 else share / (1 - share)
 
-    return {
-        "value": odds(preference.value),
-        "low": odds(preference.low),
-        "high": odds(preference.high),
-    }
+    ends = {"value": preference.value, "low": preference.low, "high": preference.high}
+    return {end: odds(share) for end, share in ends.items()}
 
 
-def _strengths(study: Study, found: Sequence[Comparison]) -> dict[str, float] | None:
-    """Bradley-Terry log-strengths, ours 0."""
+def _strengths(
+    study: Study, found: Sequence[Comparison], table: Mapping[str, Mapping[str, Metric]]
+) -> dict[str, dict[str, float | None]] | None:
+    """Bradley-Terry log-strengths, ours 0; intervals are those of the odds, as ours is in each."""
     names = (study.ours, *study.against)
     wins = np.zeros((len(names), len(names)))
     for c in found:
@@ -257,13 +206,17 @@ def _strengths(study: Study, found: Sequence[Comparison]) -> dict[str, float] | 
     fitted = strengths(wins)
     if fitted is None or not all(map(math.isfinite, fitted)):
         return None
-    return dict(zip(names, map(float, fitted), strict=True))
+    said: dict[str, dict[str, float | None]] = {}
+    for name, value in zip(study.against, fitted[1:], strict=True):
+        odds = _odds(table[name]["preference"])
+        low, high = (None if o is None else -math.log(o) for o in (odds["high"], odds["low"]))
+        said[name] = {"value": float(value), "low": low, "high": high}
+    return said
 
 
 def _alpha(found: Sequence[Comparison]) -> dict[str, Any]:
     """Agreement about which of the three it is, over comparisons that several raters made."""
-    units: dict[Any, list[float]] = {}
-    for c in found:
-        units.setdefault((c.item, c.against), []).append(c.score)
-    several = sum(len(v) > 1 for v in units.values())
-    return {"value": alpha(dict(units)), "comparisons": several}
+    units = [(c.item, c.against) for c in found]
+    several = sum(times > 1 for times in Counter(units).values())
+    metric = alpha_of([c.score for c in found], units, _clusters(found))
+    return {**metric.to_json(), "comparisons": several}

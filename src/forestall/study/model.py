@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -99,7 +99,7 @@ class Trial:
     check: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Study:
     """All of it.
 
@@ -138,7 +138,7 @@ class Study:
             right, other = item.said_by(self.ours), item.said_by(trial.against)
         return (right, other) if trial.ours == "a" else (other, right)
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Sixteen hexadecimal digits of all of it: answers name the study that they are of."""
         text = json.dumps(asdict(self), sort_keys=True)

@@ -7,12 +7,13 @@ simulated raters are counted apart and never together.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from forestall.files import make_folder, replace_file
-from forestall.study.answers import read_raters
+from forestall.study.answers import Rater, read_raters
 from forestall.study.exporting import answer_rows, write_rows
 from forestall.study.measuring import power_of, summary
 from forestall.study.model import Study, read_study
@@ -39,9 +40,8 @@ class Report:
     files: tuple[Path, ...]
 
 
-def report_of(study: Study, folder: Path) -> dict[str, Any]:
-    """All numbers of a study's folder, as plain data."""
-    raters = read_raters(folder, study)
+def report_of(study: Study, raters: Sequence[Rater]) -> dict[str, Any]:
+    """All numbers of a study and its raters, as plain data."""
     people = [r for r in raters if not r.start.simulated]
     simulated = [r for r in raters if r.start.simulated]
     return {
@@ -73,13 +73,14 @@ def write_report(folder: Path, out: Path | None = None) -> Report:
         FileFormatError: study or answers are damaged.
     """
     study = read_study(folder)
-    data = report_of(study, folder)
+    raters = read_raters(folder, study)
+    data = report_of(study, raters)
     out = out or folder
     make_folder(out)
     plain, page = out / "report.json", out / "report.html"
     replace_file(plain, f"{json.dumps(data, indent=1, ensure_ascii=False)}\n".encode())
     replace_file(page, report_page(data).encode("utf-8"))
-    rows = answer_rows(study, read_raters(folder, study))
+    rows = answer_rows(study, raters)
     return Report(data, (page, plain, *write_rows(out / "answers", rows)))
 
 
@@ -90,7 +91,7 @@ def report_page(data: dict[str, Any]) -> str:
     from forestall.study.pages import asset
 
     engine = environment()
-    engine.filters["share"] = share
+    engine.filters |= {"share": share, "number": number}
     return engine.get_template("report.html.jinja").render(
         data=data, style=Markup(asset("report.css").decode("utf-8")), shown=_SHOWN
     )
@@ -106,6 +107,19 @@ def share(metric: dict[str, Any], interval: bool = True) -> str:
     return text
 
 
+def number(found: dict[str, Any], how: str = ".2f") -> str:
+    """A number that is no share, with its interval.
+
+    Args:
+        found: value, low and high.
+        how: they are written, as `format` has it.
+    """
+    text = f"{found['value']:{how}}"
+    if found["low"] is not None and found["high"] is not None:
+        text += f" [{found['low']:{how}}, {found['high']:{how}}]"
+    return text
+
+
 def table_of(data: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The main table as text, of people or of simulated raters.
 
@@ -116,11 +130,7 @@ def table_of(data: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...
     rows = []
     for name, row in data.get("against", {}).items():
         odds = row["odds"]
-        told = "–"
-        if odds is not None and odds["value"] is not None:
-            ends = [odds["low"], odds["high"]]
-            told = f"{odds['value']:.2f}"
-            told += "" if None in ends else f" [{ends[0]:.2f}, {ends[1]:.2f}]"
+        told = "–" if odds is None or odds["value"] is None else number(odds)
         cells = [share(row[what]) for what in _SHOWN]
         rows.append((name, *cells, told, str(row["wins"]["n"])))
     return header, rows

@@ -23,7 +23,7 @@ class Taste:
     Args:
         odds: rival → log-odds that ours is chosen over it, for the middle rater and item.
         rater_sd: of raters around it, in log-odds. `item_sd`: of items, for each rival anew.
-        both: probability of "both".
+        both: probability of "both". `both_sd`: of raters around it.
         careless: probability that a rater answers by a coin, checks included.
     """
 
@@ -31,14 +31,35 @@ class Taste:
     rater_sd: float = 0.4
     item_sd: float = 0.8
     both: float = 0.2
+    both_sd: float = 0.1
     careless: float = 0.0
 
+    def wins(self, rival: str) -> float:
+        """The true share of wins, over all raters and items."""
+        chosen, weights = self._chosen(rival)
+        return (1 - self.both) * float(weights @ chosen)
+
     def preference(self, rival: str) -> float:
-        """The true share of wins plus half that of both, over all raters and items."""
-        sd = float(np.hypot(self.rater_sd, self.item_sd))
+        """The true share of wins plus half that of both."""
+        return self.wins(rival) + self.both / 2
+
+    def alpha(self) -> float:
+        """Krippendorff's alpha of very many raters and items who are shown each rival as often."""
+        agree, shares = 0.0, np.zeros(3)
+        for rival in self.odds:
+            chosen, weights = self._chosen(rival)
+            both = np.full_like(chosen, self.both)
+            each = np.stack([(1 - both) * chosen, (1 - both) * (1 - chosen), both])
+            agree += float((each**2).sum(axis=0) @ weights) / len(self.odds)
+            shares += each @ weights / len(self.odds)
+        return 1 - (1 - agree) / (1 - float((shares**2).sum()))
+
+    def _chosen(self, rival: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How often ours is chosen by all raters, on items easy and hard; weights of the items."""
         nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-        wins = float((_logistic(self.odds[rival] + sd * nodes) * weights).sum() / weights.sum())
-        return (1 - self.both) * wins + self.both / 2
+        weights = weights / weights.sum()
+        items, raters = self.item_sd * nodes, self.rater_sd * nodes
+        return _logistic(self.odds[rival] + items[:, None] + raters) @ weights, weights
 
 
 def simulate(study: Study, taste: Taste, seed: int) -> list[Rater]:
@@ -51,7 +72,7 @@ def simulate(study: Study, taste: Taste, seed: int) -> list[Rater]:
     }
     raters = []
     for number, trials in enumerate(study.raters, 1):
-        leans = {rival: random.normal(0, taste.rater_sd) for rival in study.against}
+        lean, both = random.normal(0, taste.rater_sd), _both(taste, random)
         careless = random.random() < taste.careless
         answers = {}
         for position, trial in enumerate(trials):
@@ -60,8 +81,8 @@ def simulate(study: Study, taste: Taste, seed: int) -> list[Rater]:
             elif trial.check:
                 choice = trial.ours
             else:
-                odds = taste.odds[trial.against] + leans[trial.against]
-                choice = _choice(trial, odds + easy[trial.item, trial.against], taste, random)
+                odds = taste.odds[trial.against] + lean + easy[trial.item, trial.against]
+                choice = _choice(trial, odds, both, random)
             answers[position] = Answer(position, choice, round(float(random.gamma(4, 5)), 1))
         raters.append(Rater(Start(study.digest, number, simulated=True), answers))
     return raters
@@ -79,8 +100,14 @@ def write_simulated(folder: Path, raters: list[Rater]) -> None:
             file.add(answer)
 
 
-def _choice(trial: Trial, odds: float, taste: Taste, random: np.random.Generator) -> Choice:
-    if random.random() < taste.both:
+def _both(taste: Taste, random: np.random.Generator) -> float:
+    """How often a rater says "both", from a beta distribution."""
+    size = taste.both * (1 - taste.both) / taste.both_sd**2 - 1 if taste.both_sd else 0
+    return float(random.beta(taste.both * size, (1 - taste.both) * size)) if size else taste.both
+
+
+def _choice(trial: Trial, odds: float, both: float, random: np.random.Generator) -> Choice:
+    if random.random() < both:
         return "both"
     wins = random.random() < float(_logistic(np.array(odds)))
     return trial.ours if wins else ("b" if trial.ours == "a" else "a")

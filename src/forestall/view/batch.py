@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from forestall.errors import FileFormatError
-from forestall.experiments.folder import episodes_in
+from forestall.experiments.folder import EFFORT, episodes_in
 from forestall.experiments.stored import MOST_ROWS_BYTES, ROWS, Asked
 from forestall.reading.documents import parse_json
 from forestall.reading.files import read_bytes
@@ -56,28 +56,48 @@ class Batch:
         done: how many episodes are finished.
         newest: of them, the last one first.
         size: of the file of rows in bytes, when it was read; a page asks what has come since.
+        left_s: how long the rest takes at the pace so far, as the bar of the command has it; None
+            before the first episode of a call, and where nobody is at work.
     """
 
     asked: Sequence[Asked]
     done: int
     newest: Sequence[EpisodeLine]
     size: int
+    left_s: float | None = None
 
 
-def batch_of(folder: Path) -> Batch:
+def batch_of(folder: Path, busy: bool = True) -> Batch:
     """How far an experiment has come.
+
+    Args:
+        folder: of it.
+        busy: whether somebody is at work on it.
 
     Raises:
         FileFormatError: what it writes is damaged.
     """
-    asked = sorted(episodes_in(folder).asked(), key=lambda a: (a.profile, a.set, a.setup))
+    results = episodes_in(folder)
+    asked = sorted(results.asked(), key=lambda a: (a.profile, a.set, a.setup))
     data = read_bytes(folder / ROWS, "results", MOST_ROWS_BYTES) if size_of(folder) else b""
     whole = data[: data.rfind(b"\n") + 1]
     lines = whole[-_TAIL_BYTES:].decode("utf-8", "replace").split("\n")[:-1]
     if len(whole) > _TAIL_BYTES:
         del lines[0]  # the first may be half of one
     found = [_line(parse_json(line)) for line in reversed(lines[-NEWEST:])]
-    return Batch(asked, whole.count(b"\n"), found, len(data))
+    done, wanted = whole.count(b"\n"), sum(a.episodes for a in asked)
+    before = results.begun_with() if busy else None
+    left_s = None if before is None else _left_s(folder, done - before, wanted - done)
+    return Batch(asked, done, found, len(data), left_s)
+
+
+def _left_s(folder: Path, new: int, missing: int) -> float | None:
+    """Time for the missing episodes: a call writes down that it begins, and each new episode."""
+    try:
+        began, last = ((folder / name).stat().st_mtime for name in (EFFORT, ROWS))
+    except OSError:
+        return None
+    return max(missing, 0) * (last - began) / new if new > 0 and last > began else None
 
 
 def size_of(folder: Path) -> int:

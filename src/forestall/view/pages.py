@@ -138,6 +138,15 @@ def _ago(changed_s: float) -> str:
     return time.strftime("%Y-%m-%d %H:%M", time.localtime(changed_s))
 
 
+def _roughly(seconds: float) -> str:
+    """A time that is an estimate, in no finer units than it deserves."""
+    minutes = round(seconds / 60)
+    if minutes < 1:
+        return "less than a minute"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
 def _render(name: str, **values: Any) -> str:
     found: Mapping[str, Any] = values
     return environment().get_template(f"{name}.html.jinja").render(found)
@@ -160,6 +169,7 @@ def environment() -> Environment:
         "picture_link": picture_link,
         "duration": duration,
         "date": _ago,
+        "roughly": _roughly,
         "look": lambda o: OUTCOME_LOOKS[o][0],
         "sign": lambda o: OUTCOME_LOOKS[o][1],
     }

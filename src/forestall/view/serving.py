@@ -189,8 +189,9 @@ class _Handler(PageHandler):
         if place in found.experiments:
             row = found.experiments[place]
             file = self.server.index.folder_of(place) / "index.html"
-            if self._works(row) or (row.wanted > row.episodes and not file.is_file()):
-                self.page(batch_page(row, batch_of(file.parent), self._works(row)))
+            busy = self._works(row)
+            if busy or (row.wanted > row.episodes and not file.is_file()):
+                self.page(batch_page(row, batch_of(file.parent, busy), busy))
                 return
             if not file.is_file():
                 raise Refused(
