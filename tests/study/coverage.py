@@ -70,7 +70,7 @@ def truth_of(taste: Taste) -> dict[tuple[str, str], float]:
 
 def said_by(report: Any) -> dict[tuple[str, str], Any]:
     """The same numbers of a report's raters, with their intervals."""
-    found = {}
+    found: dict[tuple[str, str], Any] = {}
     for name, row in report["against"].items():
         found |= {(name, what): row[what] for what in SHARES}
         if name != ALL:

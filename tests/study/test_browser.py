@@ -101,7 +101,7 @@ def test_axe_finds_nothing_that_a_screen_reader_would_miss(
         found.append(axe_says(page))
     larger = make(tmp_path / "larger", 30, Design(8))
     write_simulated(tmp_path / "larger", simulate(larger, TASTE, seed=1))
-    page.set_content(report_page(report_of(larger, tmp_path / "larger")))
+    page.set_content(report_page(report_of(larger, read_raters(tmp_path / "larger", larger))))
     found.append(axe_says(page))
     page.context.close()
     assert found == [""] * 4
