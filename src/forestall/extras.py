@@ -40,6 +40,7 @@ EXTRAS: Mapping[str, Extra] = {
     "text": Extra(("sentence_transformers",), "a sentence encoder, --encoder sentence"),
     "training": Extra(("torch", "onnx"), "training an image-text encoder"),
     "virtualhome": Extra(("virtualhome_eval",), "VirtualHome, bench third-party"),
+    "viz": Extra(("rerun",), "recordings for the Rerun viewer, export and run --log rerun:FILE"),
     "vision": Extra(
         ("torch", "transformers"), "models of real pictures: --segmenter finder, --states clip"
     ),

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from . import live, mutate, scene
+from . import live, logs, mutate, scene
 from .make_corpus import CORPUS
 
 
@@ -405,5 +405,6 @@ READERS: dict[str, Reader] = {
     "pddl": Reader(_pddl, _read_domain),
     "seen": Reader(lambda _, rng: live.observation(rng), live.judge),
     "scene": Reader(lambda _, rng: live.dictionary(rng), live.check),
+    **{name: Reader(*pair) for name, pair in logs.readers().items()},
 }
 """By name; "seen" and "scene" are observations and scenes in memory, handed to a monitor."""

@@ -10,7 +10,7 @@ import pytest
 from forestall.types.decision import Outcome
 from stranger import scene as stranger_scene
 
-from . import live, scene
+from . import live, logs, scene
 from .make_corpus import CORPUS
 from .readers import READERS, Reader
 from .run import GOOD, HANG, READ, TRACEBACK, Case, run_all, run_case
@@ -42,6 +42,12 @@ def test_the_corpus_is_read_before_it_is_damaged(name: str, tmp_path: Path) -> N
         shutil.copytree(source if source.is_dir() else source.parent, tmp_path, dirs_exist_ok=True)
         target = tmp_path if source.is_dir() else tmp_path / source.name
         assert READERS[name].read(target) is None
+
+
+@pytest.mark.parametrize("name", logs.readers())
+def test_the_logs_are_read_before_they_are_damaged(name: str, tmp_path: Path) -> None:
+    place = logs.put(logs.written(logs.KINDS[name]), tmp_path / "log")
+    assert READERS[name].read(place) is None
 
 
 def test_what_is_not_damaged_may_proceed() -> None:

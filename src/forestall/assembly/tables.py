@@ -233,6 +233,7 @@ LOGS: Mapping[str, str] = {
     "folder": "forestall.assembly.log_folder:FolderWriter",
     "lerobot": "forestall.logs.lerobot_out:LeRobotWriter",
     "mcap": "forestall.logs.mcap_out:McapWriter",
+    "rerun": "forestall.logs.rerun_out:RerunWriter",
 }
 """What writes a run as it happens (`logs.writing.LogWriter`), each made with a path: no part of a
 run. Others add theirs by entry point, group "forestall.log"."""

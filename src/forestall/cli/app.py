@@ -22,7 +22,7 @@ from forestall.cli.flags import spelt
 from forestall.cli.importing import import_
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
-from forestall.cli.page import gallery, page
+from forestall.cli.page import export, gallery, page
 from forestall.cli.parts import parts
 from forestall.cli.perceive import perceive
 from forestall.cli.plan import plan
@@ -45,6 +45,7 @@ for command in (
     view,
     page,
     gallery,
+    export,
     tasks,
     scenarios,
     parts,

@@ -10,6 +10,7 @@ EXAMPLES: Mapping[str, str] = {
     "view": "view runs",
     "page": "page runs/heat-potato-undisturbed-proactive-0-20260101-120000",
     "gallery": "gallery shown runs/microwave-occupied runs/pan-dirty",
+    "export": "export runs/microwave-occupied rerun:run.rrd",
     "tasks": "tasks --json",
     "tasks check": "tasks check fetch-ladle.toml",
     "scenarios": "scenarios --task heat-potato --set robofail",

@@ -1,4 +1,4 @@
-"""`forestall page` and `forestall gallery`: runs drawn again from their records."""
+"""`forestall page`, `gallery` and `export`: runs shown again from their records."""
 
 from __future__ import annotations
 
@@ -34,4 +34,23 @@ def gallery(out: Path, /, *runs: Path) -> int:
     if not runs:
         raise InputError("no run was named: give the folder of at least one")
     print(write_gallery(out, runs))
+    return 0
+
+
+def export(run: Path, log: str, /) -> int:
+    """Write the record of a run for another program's viewer: what was seen, said and done.
+
+    A record keeps pictures and no depth; `forestall run --log` writes those, too (docs/logs.md).
+
+    Args:
+        run: the folder of a run (see docs/record-format.md).
+        log: rerun:FILE, a new file for the Rerun viewer.
+    """
+    from forestall.assembly.logs import export as write
+    from forestall.assembly.logs import showing
+    from forestall.records.record import read_record
+
+    writer = showing(log)
+    write(read_record(run), run if run.is_dir() else run.parent, writer)
+    print(log.partition(":")[2])
     return 0

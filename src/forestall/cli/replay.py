@@ -24,6 +24,7 @@ def replay(
     layout: Path | None = None,
     steps: Path | None = None,
     page: Path | None = None,
+    show: Annotated[str | None, Parameter(name="--log")] = None,
     parts: RunFlags = DEFAULTS,
     as_json: Json = False,
 ) -> int:
@@ -39,10 +40,12 @@ def replay(
         layout: a TOML file that says which topic or column is what.
         steps: a CSV file that says when subtasks began.
         page: an HTML file to write about it, of one run.
+        show: a log to write of it, of one run: rerun:FILE for the Rerun viewer.
         parts: who judges; --memory FILE unless the strategy needs none.
         as_json: print JSON.
     """
     from forestall.assembly.demonstrations import memory_path
+    from forestall.assembly.logs import export, showing
     from forestall.assembly.make import needs_memory
     from forestall.assembly.recorded import named_data, open_data
     from forestall.assembly.replaying import replay as replayed
@@ -51,7 +54,8 @@ def replay(
     from forestall.errors import InputError
     from forestall.report.page import write_page
 
-    given = parts.given()
+    given, writer = parts.given(), None if show is None else showing(show)
+    shown = page is not None or writer is not None
     opened = open_data(*named_data(log), given, {"layout": layout, "steps": steps})
     config = replay_config(opened, given)
     demonstrations, memory = None, None
@@ -61,17 +65,17 @@ def replay(
         demonstrations, memory = memory_of(config, as_json)
     found: list[Replayed] = []
     for one in runs_of(opened, run):
-        if page is not None and found:
-            raise InputError("--page is of one run: name it with --run")
-        found.append(
-            replayed(opened, one, demonstrations, memory, given, pictures=page is not None)
-        )
+        if shown and found:
+            raise InputError("--page and --log are of one run: name it with --run")
+        found.append(replayed(opened, one, demonstrations, memory, given, pictures=shown))
         if not as_json:
             _tell(found[-1])
     if not found:
         raise InputError(f"{log}: no run of it can be used; 'forestall import --dry-run' says why")
     if page is not None:
         write_page(found[0].judgements.record, page)
+    if writer is not None:
+        export(found[0].judgements.record, None, writer)
     if as_json:
         print(json.dumps([_json(one) for one in found], indent=2))
     elif page is not None:

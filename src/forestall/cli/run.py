@@ -56,7 +56,7 @@ def run(
         without: a part to leave out: subtask-node, structure, nodes, edges, reasoning, validation.
         out: folder for the record, its pictures and the page; a new one under runs/ by default.
         log: keep all that is seen and done, too: mcap:FILE, lerobot:FOLDER or folder:FOLDER, for
-            `forestall import` and `forestall replay` (docs/logs.md).
+            `forestall import` and `forestall replay`; rerun:FILE for a viewer (docs/logs.md).
         beside: strategies that the same start is run under as well; none: what it would have cost
             to have no monitor.
         parts: which parts; the strategy `all` is proactive beside none, post-hoc and online.

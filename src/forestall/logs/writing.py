@@ -1,17 +1,18 @@
 """What a log is told while it is written, and the listener that tells it of a run.
 
-Called by the episode loop's audience; calls a writer (`mcap_out`, `lerobot_out`). A listener cannot
-change an episode: a log that fails is said in the record's notes.
+Called by the episode loop's audience; calls a writer (`mcap_out`, `lerobot_out`, `rerun_out`). A
+listener cannot change an episode: a log that fails is said in the record's notes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from forestall.errors import InputError
+from forestall.records.derived import left_at, new_plan
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord, SkillStatus
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
@@ -68,6 +69,33 @@ class LogWriter(Protocol):
         """Take away what was written; after `finish` nothing happens."""
 
 
+@runtime_checkable
+class JudgedWriter(LogWriter, Protocol):
+    """A writer that also shows what a monitor made of what was seen."""
+
+    def judged(
+        self,
+        boundary: BoundaryRecord,
+        before: Sequence[Subtask],
+        after: Sequence[Subtask] | None,
+    ) -> None:
+        """A boundary was judged, on the newest look.
+
+        Args:
+            boundary: its record.
+            before: what was left of the plan.
+            after: the plan that was proposed for it; None where it stays.
+        """
+
+
+def head_of(record: EpisodeRecord) -> Head:
+    """What a log of a run says when the run begins."""
+    task = record.task
+    scene = f"{task.scene.room or task.domain}-{record.seed}"
+    name = "-".join((task.name, record.scenario or "undisturbed", str(record.seed)))
+    return Head(name, task.name, scene, task.goal.text, task.domain)
+
+
 class EpisodeLog:
     """Listener that writes all that a run sees and does (`seams.Listener`, `LookListener`).
 
@@ -86,11 +114,8 @@ class EpisodeLog:
 
     def on_start(self, record: EpisodeRecord) -> None:
         """The episode begins."""
-        task = record.task
-        scene = f"{task.scene.room or task.domain}-{record.seed}"
-        name = "-".join((task.name, record.scenario or "undisturbed", str(record.seed)))
         with self._wholly():
-            self._writer.begin(Head(name, task.name, scene, task.goal.text, task.domain))
+            self._writer.begin(head_of(record))
 
     def on_look(self, observation: Observation) -> None:
         """The robot has looked."""
@@ -99,6 +124,11 @@ class EpisodeLog:
 
     def on_boundary(self, boundary: BoundaryRecord, context: BoundaryContext) -> None:
         """A boundary was judged: what was seen is written already."""
+        if isinstance(self._writer, JudgedWriter):
+            plan = new_plan(boundary.replan)
+            after = None if plan is None else plan.subtasks
+            with self._wholly():
+                self._writer.judged(boundary, left_at(context), after)
 
     def on_executed(self, executed: ExecutedRecord, time_s: float) -> None:
         """A subtask was executed."""

@@ -20,7 +20,7 @@ from forestall.types.episode import (
 )
 from forestall.types.facts import category_of
 from forestall.types.plan import Plan, Subtask, same_step
-from forestall.types.runtime import When
+from forestall.types.runtime import BoundaryContext, When
 from forestall.types.verdict import Decision, Replan, ReplanOutcome
 
 SIMULATOR_PHASES = frozenset({"act", "observe"})
@@ -126,6 +126,11 @@ def new_plan(replan: Replan | None) -> Plan | None:
     if replan is None or replan.outcome is not ReplanOutcome.SOLVED:
         return None
     return replan.plan
+
+
+def left_at(context: BoundaryContext) -> tuple[Subtask, ...]:
+    """The plan for the rest of the task when a boundary came; what is just done is not in it."""
+    return context.remaining()[context.when is When.AFTER :]
 
 
 def cause_of(boundary: BoundaryRecord) -> str:

@@ -29,12 +29,12 @@ from forestall.records.codec import (
     record_from_json,
     record_to_json,
 )
-from forestall.records.derived import alarm_at, new_plan
+from forestall.records.derived import alarm_at, left_at, new_plan
 from forestall.records.pictures import encode_jpeg, file_name
 from forestall.records.plain import plain
 from forestall.types.episode import BoundaryRecord, EpisodeRecord, ExecutedRecord
 from forestall.types.observation import Observation
-from forestall.types.runtime import BoundaryContext, When
+from forestall.types.runtime import BoundaryContext
 
 RECORD_NAME = "record.json"
 LINES_NAME = "boundaries.jsonl"
@@ -91,7 +91,7 @@ class RunRecorder:
                 boundary,
                 position=position,
                 mark=None,
-                before=context.remaining()[context.when is When.AFTER :],
+                before=left_at(context),
                 after=None if plan is None else plan.subtasks,
             ),
             alarm=None if alarm is None else alarm_json(alarm),
