@@ -108,7 +108,7 @@ def test_a_look_is_kept_to_the_last_bit(tmp_path: Path) -> None:
         assert np.array_equal(depth_m, frame.depth_m)
         assert found.latest(f"{place}/depth", "DepthImage:meter", 0) == [1.0]
         (matrix,) = found.latest(place, "Pinhole:image_from_camera", 0)
-        wanted = [[CAMERA.fx, 0, CAMERA.cx], [0, CAMERA.fy, CAMERA.cy], [0, 0, 1]]
+        wanted = np.array([[CAMERA.fx, 0, CAMERA.cx], [0, CAMERA.fy, CAMERA.cy], [0, 0, 1]])
         assert np.allclose(np.reshape(matrix, (3, 3)).T, wanted)
         assert found.latest(place, "Pinhole:resolution", 0) == [[WIDTH, HEIGHT]]
         (turned,) = found.latest(place, "Transform3D:mat3x3", 0)
