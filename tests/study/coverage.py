@@ -1,12 +1,13 @@
-"""How often the report's intervals hold the truth: `PYTHONPATH=tests python -m study.coverage`.
+"""How often the intervals of the report hold: `PYTHONPATH=tests python -m study.coverage 200 CSV`.
 
-From the root. A study is made of watched runs; its raters are drawn, answer into the files that the
+From the root; the table is written to CSV. A study is made of watched runs; its raters are drawn, answer into the files that the
 server writes, and are counted by the report, 200 times over or as often as is said behind the
 command; what `report.json` then says is held against what the raters were drawn from.
 """
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 import sys
@@ -114,16 +115,21 @@ def made_of_runs(folder: Path) -> tuple[Study, Path]:
     return study, place
 
 
-def main() -> None:
-    """Print a line for every number."""
-    times = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+def main(times: int = 200, out: Path | None = None) -> None:
+    """Print a line for every number, and write all as a table."""
     with TemporaryDirectory() as folder:
         study, place = made_of_runs(Path(folder))
         print(f"{len(study.items)} items, {len(study.raters)} raters, {times} studies")
+        rows = [("against", "number", "interval holds the truth", "width")]
         for found in coverage(study, place, taste_of(study.against), times):
-            name = f"{found.of or 'whole study':26} {found.what:10}"
-            print(f"{name} {100 * found.held / times:5.1f} % held, {found.wide:.3f} wide")
+            held = f"{100 * found.held / times:.1f} % ({found.held}/{times})"
+            rows.append((found.of or "whole study", found.what, held, f"{found.wide:.3f}"))
+            print("  ".join(rows[-1]))
+    if out is not None:
+        with out.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 if __name__ == "__main__":
-    main()
+    given = sys.argv[1:3]
+    main(int(given[0]) if given else 200, Path(given[1]) if given[1:] else None)
