@@ -1,8 +1,8 @@
 """How often the intervals of the report hold: `PYTHONPATH=tests python -m study.coverage 200 CSV`.
 
-From the root; the table is written to CSV. A study is made of watched runs; its raters are drawn, answer into the files that the
-server writes, and are counted by the report, 200 times over or as often as is said behind the
-command; what `report.json` then says is held against what the raters were drawn from.
+From the root; the table is written to CSV. A study is made of watched runs; its raters are drawn,
+answer into the files that the server writes, and are counted by the report, as often as is said;
+what `report.json` then says is held against what the raters were drawn from.
 """
 
 from __future__ import annotations
