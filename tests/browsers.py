@@ -18,8 +18,11 @@ def page_of(chromium: Any, where: str, **how: Any) -> Any:
 
 
 def assert_fits(page: Any) -> None:
-    """Nothing is wider than the window."""
-    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    """Nothing is wider than the window, once the page with its style is there."""
+    page.wait_for_load_state("load")
+    page.wait_for_function(
+        "document.documentElement.scrollWidth <= window.innerWidth", timeout=30_000
+    )
 
 
 def axe_says(page: Any) -> str:

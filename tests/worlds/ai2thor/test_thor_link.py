@@ -1,5 +1,6 @@
 """A build that dies, hangs or never starts: said clearly and in time; nothing goes on behind it."""
 
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -98,3 +99,18 @@ def test_a_world_whose_build_dies_can_be_held_and_begun_anew(tmp_path: Path) -> 
     world.reset(0)
     assert world.execute(Subtask.parse("pick_up(Mug)")).status is SkillStatus.SUCCEEDED
     world.close()
+
+
+@BOTH
+def test_once_stopped_no_thread_goes_on(tmp_path: Path, server: Server) -> None:
+    before = set(threading.enumerate())
+    link = Link(build(tmp_path, "--dies-at", "Done:2", server=server), SCENE)
+    assert set(threading.enumerate()) > before or server is not Server.WSGI
+    link.step("Done")
+    with pytest.raises(ForestallError, match="ended in Done"):
+        link.step("Done")
+    link.stop()
+    ends = time.monotonic() + 20.0
+    while (left := set(threading.enumerate()) - before) and time.monotonic() < ends:
+        time.sleep(0.05)
+    assert not left

@@ -24,7 +24,7 @@ from typing import Any
 
 from forestall.errors import ForestallError, InputError
 
-_LOOK_S, _GRACE_S = 0.1, 1.0
+_LOOK_S, _GRACE_S, _ENDS_S = 0.1, 1.0, 5.0
 _LOG = "~/.ai2thor/log/unity.log"
 
 VISIBLE_M = 1.5
@@ -176,8 +176,7 @@ class Link:
         for pipe in ("server_pipe", "client_pipe"):
             with suppress(AttributeError, OSError):  # one of the two sorts of servers has pipes
                 getattr(server, pipe).close()
-        with suppress(AttributeError, OSError):  # and the other this
-            server.wsgi_server.server_close()
+        _end_serving(server)
         with suppress(AttributeError, OSError):
             server.tmp_dir.cleanup()
 
@@ -229,3 +228,20 @@ class Link:
         process = getattr(server, "unity_proc", None)
         code: int | None = None if process is None else process.poll()
         return code
+
+
+def _end_serving(server: Any) -> None:
+    """End the loop of a server over WSGI, which its own `stop` does not.
+
+    A loop whose socket is closed under it never ends and takes a core: it ends first, and where it
+    does not (a handler waits for ever), its socket stays open.
+    """
+    loop, thread = getattr(server, "wsgi_server", None), getattr(server, "server_thread", None)
+    if loop is None:
+        return
+    if thread is not None and thread.is_alive():
+        threading.Thread(target=loop.shutdown, name="ai2thor end", daemon=True).start()
+        thread.join(_ENDS_S)
+        if thread.is_alive():
+            return
+    loop.server_close()
