@@ -148,21 +148,19 @@ class RunState:
 
     def vain(self) -> tuple[Subtask, ...]:
         """What was tried twice or more in a row and came to nothing each time."""
-        counted = self.fruitless + Counter(self._nothing_of_it())
+        counted = self._counted()
         return tuple(sorted(s for s, times in counted.items() if times >= OFTEN))
 
-    def _nothing_of_it(self) -> tuple[Subtask, ...]:
-        """The newest subtask, if what it was to bring about is seen not to be so."""
-        if self.acted is None or came_about(self.graph, self.acted, self.domain) is not Truth.FALSE:
-            return ()
-        return (self.acted,)
+    def _counted(self) -> Counter[Subtask]:
+        """`fruitless`, with what is seen now of what the newest subtask was to bring about.
 
-    def _note_fruit(self) -> None:
-        """What was seen since the newest subtask counts."""
-        if self.acted is not None and came_about(self.graph, self.acted, self.domain) is Truth.TRUE:
-            del self.fruitless[self.acted]
-        self.fruitless.update(self._nothing_of_it())
-        self.acted = None
+        Only what is seen not to be so speaks against a robot that says it has done it.
+        """
+        counted = self.fruitless.copy()
+        if self.acted is not None:
+            nothing = came_about(self.graph, self.acted, self.domain) is Truth.FALSE
+            counted[self.acted] = counted[self.acted] + 1 if nothing else 0
+        return counted
 
     def command(self, subtask: Subtask, position: int) -> Subtask:
         """What to send to the robot for a grounded subtask of the plan."""
@@ -232,7 +230,7 @@ class RunState:
         if self.last is None or not self.ready:
             raise InputError("no subtask was judged before: call before(observation) first")
         self.close_boundary()
-        self._note_fruit()
+        self.fruitless, self.acted = self._counted(), None
         subtask = self.last.subtask
         for name in subtask.args:
             if is_instance(name):

@@ -156,6 +156,10 @@ def test_what_is_looked_over_is_where_the_last_step_was_done() -> None:
     }
     over = looked_over(scene_graph(told), Subtask.parse("pick_up(Egg-1)"), DOMAIN)
     assert over == {"Egg-1", "Plate-1", "CounterTop-1"}
+    put = Subtask.parse("put_on(Plate-1, CounterTop)")
+    assert looked_over(scene_graph(told), put, DOMAIN) == {"Plate-1", "CounterTop-1"}
+    drive = Subtask.parse("navigate_to_obj(CounterTop)")
+    assert looked_over(scene_graph(told), drive, DOMAIN) == frozenset(), "of two nobody knows which"
     shut = scene_graph({**told, "hidden": ["CounterTop-1"]})
     assert looked_over(shut, Subtask.parse("navigate_to_obj(CounterTop-1)"), DOMAIN) == frozenset()
 

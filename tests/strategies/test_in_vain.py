@@ -61,13 +61,18 @@ class Kitchen:
         return "done"
 
 
-def play(kitchen: Kitchen) -> Monitor:
+def begun() -> Monitor:
     task = Task("serve", "Serve a mug", GOAL, PLAN, SceneNeeds())
     shown = {"objects": ["Mug-1"]}
     monitor = Monitor.from_demonstrations(
         [("pick_up(Mug-1)", shown)], domain="household", strategy="plan-check"
     )
     monitor.start(task)
+    return monitor
+
+
+def play(kitchen: Kitchen) -> Monitor:
+    monitor = begun()
     for _ in range(20):
         if monitor.finished:
             break
@@ -94,6 +99,22 @@ def test_a_single_slip_is_mended_with_the_same_thing() -> None:
     monitor = play(kitchen)
     assert monitor.finished and kitchen.at["Mug-1"] == "DiningTable-1"
     assert kitchen.cabinet == "closed"
+
+
+def test_what_went_well_in_between_is_not_in_vain() -> None:
+    kitchen = Kitchen()
+    kitchen.at["Mug-1"] = "gripper"
+    monitor = begun()
+    for ended in ("failed", "done", "failed"):
+        step = "navigate_to_obj(DiningTable)"
+        assert monitor.before(kitchen.look(), step).may_start
+        kitchen.done.append(step)
+        monitor.after(ended)
+        monitor._run.position = 1
+    assert monitor._run.vain() == ()
+    assert monitor.before(kitchen.look(), step).may_start
+    monitor.after("failed")
+    assert [s.skill for s in monitor._run.vain()] == ["navigate_to_obj"]
 
 
 def test_where_there_is_no_other_it_is_tried_again() -> None:

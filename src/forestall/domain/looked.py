@@ -33,8 +33,11 @@ def looked_into(graph: SceneGraph, domain: Domain) -> frozenset[str]:
 
 
 def looked_over(graph: SceneGraph, done: Subtask, domain: Domain) -> frozenset[str]:
-    """Places in sight and not shut at which the robot stands: those of the step it did last."""
-    here = list(graph.matches(done.args[-1])) if done.args else []
+    """Places in sight and not shut at which the robot stands: those of the step it did last.
+
+    A kind of place in a step tells none; what was put there tells which it is.
+    """
+    here = [name for name in done.args if graph.get(name) is not None]
     for name in here:  # grows: what each of them is in or on
         here += [p for p in graph.parents(name, domain.containing) if p not in here]
     found = (graph.get(name) for name in here)
