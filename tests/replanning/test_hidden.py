@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from forestall import Goal, Literal, Monitor, Outcome, Plan, Subtask, Task
+from forestall import Goal, Literal, Monitor, Plan, Subtask
 from forestall.domain.load import shipped
 from forestall.domain.looked import looked_into, looked_over, not_there
 from forestall.planning.validate import GraphValidator
@@ -13,11 +13,11 @@ from forestall.replanning.hidden import hiding_places, sought
 from forestall.replanning.searching import with_shutting, without
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.graph import SceneGraph
-from forestall.types.scene import SceneNeeds
 from forestall.types.symbolic import scene_graph
 from forestall.types.verdict import Diagnosis, Reference
 from planning import episodes
 from planning.corpus import PLANS
+from planning.playing import begun, played
 
 DOMAIN = shipped("household")
 PLAN = Plan.parse(["pick_up(Egg)", "put_on(Egg, CounterTop)"])
@@ -207,24 +207,8 @@ def test_what_is_in_sight_is_not_looked_for() -> None:
 
 
 def play(kitchen: Kitchen) -> Monitor:
-    """Run a monitor that needs no demonstration of this task over it."""
     goal = Goal("the egg is out", (), (Literal.parse("on_top_of(Egg, CounterTop)"),))
-    task = Task("fetch", "Fetch the egg", goal, PLAN, SceneNeeds())
-    shown = {"objects": ["Egg-1"]}
-    monitor = Monitor.from_demonstrations(
-        [("pick_up(Egg-1)", shown)], domain="household", strategy="plan-check"
-    )
-    monitor.start(task)
-    for _ in range(40):
-        if monitor.finished:
-            break
-        decision = monitor.before(kitchen.look())
-        if decision.may_start:
-            assert decision.command is not None
-            monitor.after(kitchen.do(decision.command))
-        elif decision.outcome not in (Outcome.REPLAN, Outcome.LOOK):
-            break
-    return monitor
+    return played(begun(goal, PLAN, "pick_up(Egg-1)", "Egg-1"), kitchen)
 
 
 def test_it_is_found_wherever_it_is() -> None:

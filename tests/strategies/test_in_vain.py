@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from forestall import Goal, Literal, Monitor, Plan, Subtask, Task
+from forestall import Goal, Literal, Monitor, Plan, Subtask
 from forestall.domain.brought import brings_about, came_about
 from forestall.domain.load import shipped
 from forestall.types.facts import GRIPPER, Truth
 from forestall.types.graph import ObjectNode, SceneGraph
-from forestall.types.scene import SceneNeeds
 from forestall.types.symbolic import scene_graph
+from planning.playing import begun, played
 
 DOMAIN = shipped("household")
 GOAL = Goal("a mug is on the table", (), (Literal.parse("on_top_of(Mug, DiningTable)"),))
@@ -61,26 +61,8 @@ class Kitchen:
         return "done"
 
 
-def begun() -> Monitor:
-    task = Task("serve", "Serve a mug", GOAL, PLAN, SceneNeeds())
-    shown = {"objects": ["Mug-1"]}
-    monitor = Monitor.from_demonstrations(
-        [("pick_up(Mug-1)", shown)], domain="household", strategy="plan-check"
-    )
-    monitor.start(task)
-    return monitor
-
-
 def play(kitchen: Kitchen) -> Monitor:
-    monitor = begun()
-    for _ in range(20):
-        if monitor.finished:
-            break
-        decision = monitor.before(kitchen.look())
-        if decision.may_start:
-            assert decision.command is not None
-            monitor.after(kitchen.do(decision.command))
-    return monitor
+    return played(begun(GOAL, PLAN, "pick_up(Mug-1)", "Mug-1"), kitchen)
 
 
 def times(kitchen: Kitchen, step: str) -> int:
@@ -104,7 +86,7 @@ def test_a_single_slip_is_mended_with_the_same_thing() -> None:
 def test_what_went_well_in_between_is_not_in_vain() -> None:
     kitchen = Kitchen()
     kitchen.at["Mug-1"] = "gripper"
-    monitor = begun()
+    monitor = begun(GOAL, PLAN, "pick_up(Mug-1)", "Mug-1")
     for ended in ("failed", "done", "failed"):
         step = "navigate_to_obj(DiningTable)"
         assert monitor.before(kitchen.look(), step).may_start
