@@ -7,11 +7,15 @@ from collections.abc import Sequence
 import pytest
 from adding import medians
 from graph_pairs import scene
+from hypothesis import given
+from hypothesis import strategies as st
 
+from forestall.assembly.sources import demonstrations_from
 from forestall.comparison.needs import Needs
 from forestall.comparison.preconditions import needed
-from forestall.comparison.tally import Tally, weight
+from forestall.comparison.tally import VARIED, Tally, weight
 from forestall.domain.load import shipped
+from forestall.learning.learn import learn
 from forestall.types.demonstration import Demonstration, DemonstrationStep
 from forestall.types.plan import Subtask
 from forestall.types.verdict import Precondition, Specificity
@@ -52,11 +56,17 @@ def test_weights_are_the_documented_ones() -> None:
     assert weight(4, 4) == pytest.approx(5 / 6)
     assert weight(0, 0) == pytest.approx(1 / 2)
     never_varied, varied = weight(4, 4, (4, 0)), weight(4, 4, (4, 4))
-    assert never_varied == pytest.approx(9 / 14)
-    assert 0.5 < weight(4, 4, (400, 0)) < 0.51 < never_varied < weight(4, 4) < varied
-    assert weight(4, 4, (0, 4)) > varied > 0.9
+    assert never_varied == pytest.approx(1 / (1 + (5 / 9 + 1 / 5) / 2))
+    assert never_varied < weight(4, 4) < varied < weight(4, 4, (0, 4)) < weight(9, 9, (0, 9))
     assert weight(3, 4) < 0.5, "what was false once of four times is no need"
+    assert weight(25, 28, (30, 29)) < 0.2, "a strong habit, whatever is so at other times"
     assert weight(39, 40, (20, 20)) > 0.9, "one exception of forty may be a mistake of the eyes"
+    assert weight(39, 40, (20, 20), exception=0) == 0, "nobody can have seen wrong"
+
+
+@given(st.integers(1, 10**6), st.integers(0, 10**6))
+def test_what_never_varied_stays_below_a_bound_however_often_it_was_seen(n: int, more: int) -> None:
+    assert weight(n, n, (n + more, 0)) < VARIED
 
 
 def test_a_tally_counts_runs_and_takes_back() -> None:
@@ -103,7 +113,7 @@ def test_what_the_task_makes_of_a_thing_stays_there_unless_it_varied_elsewhere()
     drive = ("gripper; Mug-1 dirty=dirty; Sink-1", "", "navigate_to_obj(Mug-1)")
     varied = [run(t, f"{t}{i}", drive, washed[0]) for t in ("a", "b") for i in range(2)]
     found = mined(varied, "pick_up(Mug-1)", "new")["dirty(?object)=clean"]
-    assert found.elsewhere == (0, 4) and found.weight > 0.9
+    assert found.elsewhere == (0, 4) and found.weight == pytest.approx(weight(4, 4, (0, 4)))
     assert found.kept is Specificity.CATEGORY
 
 
@@ -116,7 +126,7 @@ def test_what_never_varied_weighs_less_than_what_varied_at_other_times() -> None
     habit, need = found["dirty(?object)=clean"], found["filled(?object)=empty"]
     assert (habit.elsewhere, need.elsewhere) == ((4, 0), (0, 4))
     assert (habit.support, need.support) == (4, 4)
-    assert habit.weight == pytest.approx(9 / 14) and need.weight > 0.95
+    assert habit.weight == pytest.approx(weight(4, 4, (4, 0))) and need.weight > 0.9
 
 
 def test_unobserved_counts_on_neither_side() -> None:
@@ -153,3 +163,20 @@ def test_counting_one_after_another_and_all_at_once_are_the_same() -> None:
 def test_one_more_costs_the_same_in_a_large_memory() -> None:
     small, large = medians((20, 400), repeats=15)
     assert large <= 2 * small
+
+
+def test_what_another_fact_says_already_is_no_need_of_its_own() -> None:
+    objects: dict[str, object] = {n: {} for n in ("gripper", "robot-1", "lamp-1")}
+    far: dict[str, object] = {"objects": objects, "relations": []}
+    near = {"objects": objects, "relations": ["robot-1 next_to lamp-1"]}
+    shown = demonstrations_from(
+        [[("walk(robot-1, lamp-1)", far), ("push(robot-1, lamp-1)", near)] for _ in range(6)]
+    )
+    domain = learn(shown).domain
+    found = needed(Needs.of(shown, domain), Subtask.parse("push(robot-1, lamp-1)"), None, None)
+    said = {str(p.literal) for p in found}
+    assert "next_to(?robot, ?lamp)" in said
+    assert "not next_to_nothing(?robot)" not in said
+    assert "next_to_nothing(?lamp)" in said, "nothing else says it"
+    walked = needed(Needs.of(shown, domain), Subtask.parse("walk(robot-1, lamp-1)"), None, None)
+    assert "next_to_nothing(?robot)" in {str(p.literal) for p in walked}, "it is there to be said"

@@ -14,7 +14,7 @@ from forestall.domain.load import read_domain
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
 from forestall.experiments.third_party import ALL_TASKS, ITS_TASK, NO_DOMAIN, judge, without
-from forestall.experiments.third_party_needs import EFFECTS, LEARNT, compare, table
+from forestall.experiments.third_party_needs import EFFECTS, LEARNT, LIKELY, compare, table
 from forestall.experiments.third_party_rows import NEEDS, PLAN, Judged, Knowledge, Said, rows
 from forestall.types.foreign import ForeignRun
 from forestall.types.plan import Plan
@@ -95,6 +95,7 @@ class Pegs:
     name = "pegs"
     hands: tuple[str, ...] = ("gripper",)
     geometry: tuple[str, ...] = ()
+    exact = True
 
     def __init__(self, packages: Path | None = None, development: bool = False) -> None:
         self.good = () if development else tuple(run(n) for n in range(12))
@@ -111,11 +112,11 @@ class Pegs:
 
 @pytest.fixture(scope="module")
 def judged() -> list[Judged]:
-    return judge(Pegs(), pooled=True)
+    return judge(Pegs())
 
 
 def test_every_run_is_judged_with_every_knowledge(judged: list[Judged]) -> None:
-    assert len(judged) == 14 * 2 * 2
+    assert len(judged) == 14 * 3
     assert {j.knowledge.domain for j in judged} == {NO_DOMAIN, "pegs"}
     assert {j.knowledge.memory for j in judged} == {ITS_TASK, ALL_TASKS}
 
@@ -152,6 +153,8 @@ def test_needs_and_effects_are_compared_with_the_true_ones() -> None:
     precision = found[LEARNT].precision.value
     assert precision is not None and precision < 1.0
     assert found[EFFECTS].recall.value == 1.0 and found[EFFECTS].skills == 3
+    likely = found[LIKELY].precision.value
+    assert likely is not None and likely > precision, "habits weigh less than needs"
 
 
 def test_relations_that_are_mere_geometry_can_be_left_out() -> None:
@@ -178,7 +181,7 @@ def test_the_command_prints_and_writes(
     assert set(tables) == {"judges", "changes", "needs"}
     assert len(tables["judges"]) == 1 + len(data["rows"])
     assert tables["judges"][1].startswith("none,its task,score,"), tables["judges"][1]
-    assert len(data["runs"]) == 28 and data["rows"][0]["false_alarms"]["n"] == 12
+    assert len(data["runs"]) == 42 and data["rows"][0]["false_alarms"]["n"] == 12
     assert call(["bench", "third-party", "pegs", "--quiet", "--out", str(out)]) == 2
     with pytest.raises(UnknownNameError, match="unknown household 'nobody'"):
         registry.foreign("nobody")

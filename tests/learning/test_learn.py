@@ -103,6 +103,56 @@ def test_hands_may_be_named_and_there_may_be_none() -> None:
     assert named.domain.robot.hands == ("left_gripper",)
 
 
+def step(text: str, box: str, *relations: str) -> tuple[str, dict[str, object]]:
+    objects: dict[str, object] = {
+        n: {} for n in ("left_gripper", "right_gripper", "cup-1", "cup-2")
+    }
+    return (text, {"objects": objects | {"box-1": {"door": box}}, "relations": list(relations)})
+
+
+def kitchen(hand: str) -> list[tuple[str, dict[str, object]]]:
+    """A cup out of a box that is shut at first, and back into it, with one of two hands."""
+    within, held = "cup-1 lies_in box-1", f"cup-1 held_by {hand}"
+    return [
+        step("unlock(box-1)", "locked", within),
+        step("take(cup-1)", "unlocked", within),
+        step("show(cup-1)", "unlocked", held),
+        step("put(cup-1, box-1)", "unlocked", held),
+        step("lock(box-1)", "unlocked", within),
+        step("wait()", "locked", within),
+    ]
+
+
+TWO_HANDED = learn(
+    demonstrations_from([kitchen(h) for h in ("left_gripper", "right_gripper") for _ in range(3)])
+).domain
+
+
+def test_which_of_two_hands_has_a_thing_makes_no_difference() -> None:
+    assert TWO_HANDED.in_any_hand == "in_hand" and DOMAIN.in_any_hand is None
+    needed = {str(n.formula) for n in TWO_HANDED.skill("show").needs}
+    assert "in_hand(?cup)" in needed
+    assert not any(n.startswith("held_by") for n in needed)
+    shown = TWO_HANDED.derived["in_hand"]
+    assert shown.words == "{0} is in a hand"
+
+
+def test_what_shuts_a_thing_in_is_learnt_from_when_things_were_moved() -> None:
+    assert "lies_in_nothing_locked" in TWO_HANDED.derived
+    assert "lies_in_nothing_unlocked" not in TWO_HANDED.derived, "it was taken out then"
+    assert "lies_in_nothing_locked(?cup)" in {
+        str(n.formula) for n in TWO_HANDED.skill("take").needs
+    }
+    state = state_of(scene_graph(step("", "locked", "cup-1 lies_in box-1")[1]), TWO_HANDED)
+    refused = apply(state, Subtask.parse("take(cup-1)"))
+    assert isinstance(refused, Refusal)
+    assert "cup-1 lies in something whose door is locked" in refused.reason
+
+
+def test_a_draft_with_two_hands_is_written_and_read_back() -> None:
+    assert read_domain(domain_toml(TWO_HANDED), "draft.toml") == TWO_HANDED
+
+
 def test_a_skill_with_changing_arity_is_refused_by_name() -> None:
     other = [("grasp(peg-1, tray-1)", scene())]
     with pytest.raises(InputError, match=r"grasp has not always equally many.*grasp\(peg-1\) and"):

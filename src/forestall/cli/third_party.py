@@ -29,7 +29,6 @@ def third_party(
     *,
     packages: Path | None = None,
     development: Flag = False,
-    pooled: Flag = False,
     out: Path | None = None,
     as_json: Json = False,
     quiet: Flag = False,
@@ -43,7 +42,6 @@ def third_party(
         household: whose programs: virtualhome.
         packages: folder in which its packages were installed; where Python finds them by default.
         development: judge the tasks on which things may be set, and not those that are reported.
-        pooled: judge also with the demonstrations of all tasks, which takes ten times as long.
         out: a new folder for the results: tables (CSV), and in results.json.xz what was said of
             every run.
         as_json: print JSON instead of the tables.
@@ -62,7 +60,7 @@ def third_party(
         raise InputError(f"{out} is there already: name a new folder")
     chosen = foreign(household)(packages=packages, development=development)
     with bar("judging", quiet=quiet or as_json) as feed:
-        judged = judge(chosen, feed, pooled=pooled)
+        judged = judge(chosen, feed)
     runs = {r.name: r for g in chosen.good for r in (g, *chosen.demonstrations(g))}
     needs, found = table(compare(chosen, list(runs.values()))), rows(judged)
     first = [j for j in judged if j.knowledge == judged[0].knowledge]

@@ -15,6 +15,7 @@ from forestall.comparison.needs import Needs
 from forestall.comparison.parts import spoken_of
 from forestall.comparison.preconditions import violations
 from forestall.comparison.relevance import counts
+from forestall.comparison.tally import VARIED
 from forestall.domain.model import Domain
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
@@ -56,7 +57,7 @@ class Knowledge:
 
     counts: Callable[[], Needs]
     foresee: Foresee | None = None
-    early_weight: float = 0.75
+    early_weight: float = VARIED
 
 
 def step_of(references: Sequence[Reference], task: str, done: int) -> int:

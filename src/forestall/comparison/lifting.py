@@ -7,6 +7,7 @@ graph; `lift` collects the true ones, the negative ones included.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import Enum
 from itertools import permutations
 
@@ -34,8 +35,8 @@ def lift(graph: SceneGraph, subtask: Subtask, domain: Domain) -> frozenset[Liter
       somewhere not whether that is open or on: it makes no difference to driving);
     - vacant(?x) for receptacles with a capacity and for vessels;
     - accessible(?x) for what can be picked up; unblocked(?x) for what the skill needs clear;
-    - held_by(?x, gripper) for each hand, hand_empty(), and held_by(Lettuce, gripper) for what is no
-      argument;
+    - held_by(?x, gripper) for each hand, or that any hand has it, where the domain has a word for
+      that; hand_empty(), and held_by(Lettuce, gripper) for what is no argument;
     - the relations between two arguments that skills are about: inside(?object, ?target) or not;
     - every other derived fact about one argument, or about none, that the domain wants mined;
     - contents by category, but not of supports, on which many things merely stand.
@@ -106,7 +107,14 @@ def _between(roles: Mapping[str, str], graph: SceneGraph, domain: Domain) -> set
 def _derived(variables: tuple[str, ...], domain: Domain) -> set[Literal]:
     """Derived facts beyond those that the engine knows by their part."""
     roles = domain.roles
-    apart = (roles.vacant, roles.accessible, roles.unblocked, roles.hand_empty, roles.shut)
+    apart = (
+        roles.vacant,
+        roles.accessible,
+        roles.unblocked,
+        roles.hand_empty,
+        roles.shut,
+        domain.in_any_hand,
+    )
     found = set()
     for predicate in domain.derived.values():
         if predicate.mined and predicate.name not in apart:
@@ -120,8 +128,11 @@ def _about_movable(variable: str, domain: Domain) -> set[Literal]:
     roles, found = domain.roles, set()
     if roles.accessible:
         found.add(Literal(roles.accessible, (variable,)))
-    for hand in domain.robot.hands if roles.holding else ():
-        found |= {Literal(str(roles.holding), (variable, hand), v) for v in ("true", "false")}
+    if roles.holding:
+        one = [Literal(roles.holding, (variable, hand)) for hand in domain.robot.hands]
+        if domain.in_any_hand:
+            one = [Literal(domain.in_any_hand, (variable,))]
+        found |= {replace(x, value=v) for x in one for v in ("true", "false")}
     return found
 
 

@@ -84,6 +84,7 @@ class Needs:
         self.after: dict[str, dict[Slot, Tally]] = {}
         self.changes: dict[str, dict[Slot, set[str]]] = {}
         self.played: dict[tuple[str, str], set[str]] = {}
+        self.implied: dict[tuple[object, ...], bool] = {}
 
     @classmethod
     def of(cls, demonstrations: Iterable[Demonstration], domain: Domain) -> Needs:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from forestall.comparison.implied import said_once
 from forestall.comparison.lifting import Kind, evaluate, kind_of, lift
 from forestall.comparison.needs import (
     Kinds,
@@ -21,7 +22,7 @@ from forestall.comparison.needs import (
     variables_of,
 )
 from forestall.comparison.parts import applies, same_part, spoken_of
-from forestall.comparison.tally import Tally, weight
+from forestall.comparison.tally import EXCEPTION, VARIED, Tally, weight
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.types.facts import Truth
@@ -45,17 +46,22 @@ class MiningConfig:
         foreign_weight: least weight of what was never seen for these kinds of things, or, if it
             decides over a task's outcome only, never in this task; what the skill's schema speaks
             of needs no more than that the demonstrations of others do not speak against it.
+        exception: how probable it is that a need was not seen to be met before a skill that went
+            well. 0 where nobody can have seen wrong: one exception then tells a habit.
     """
 
     minimum_support: int = 2
     contextual_support: int = 3
-    foreign_weight: float = 0.75
+    foreign_weight: float = VARIED
+    exception: float = EXCEPTION
 
     def __post_init__(self) -> None:
         if self.minimum_support < 1 or self.contextual_support < 1:
             raise InputError("a precondition needs the support of at least one demonstration")
         if not 0 <= self.foreign_weight <= 1:
             raise InputError(f"foreign_weight {self.foreign_weight} is not between 0 and 1")
+        if not 0 <= self.exception < 1:
+            raise InputError(f"exception {self.exception}: give a probability, 0 or more, below 1")
 
 
 def mine(
@@ -122,7 +128,7 @@ def needed(
         Preconditions, the heaviest first.
     """
     config = config or MiningConfig()
-    found = [*_of_arguments(counts, subtask, task, config)]
+    found = said_once(list(_of_arguments(counts, subtask, task, config)), counts, subtask)
     if task is not None and step is not None:
         found += _of_the_rest(counts, subtask, task, step, config)
     return tuple(sorted(found, key=lambda p: (-round(p.weight, 6), p.literal)))
@@ -253,7 +259,8 @@ class _Asked:
 
     def _weight(self, level: Specificity, value: str) -> float:
         tally = self._tallies[level]
-        return weight(tally.always(value), tally.seen, self._elsewhere[level].ever(value))
+        other = self._elsewhere[level].ever(value)
+        return weight(tally.always(value), tally.seen, other, self._config.exception)
 
 
 def _of_the_rest(

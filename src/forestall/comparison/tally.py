@@ -4,28 +4,35 @@ Called by `needs`; calls nothing.
 
 Let a literal have held before a skill in s of the n demonstrations in which it was observed, and at
 other times, for things of the same kinds, have held in t demonstrations and not held in d (one may
-count in both). What was not observed counts nowhere. Two explanations are compared, either of them
-as likely as the other beforehand:
+count in both). What was not observed counts nowhere. A need is as likely beforehand as a habit:
 
-- need: the skill was done because it held; an exception has the probability `EXCEPTION`, so that
-  what was seen has the likelihood EXCEPTION^(n - s);
+- need: the skill was done because it held; an exception has the probability e, so that what was
+  seen has the likelihood e^(n - s);
 - habit: it holds before the skill as often as at other times. How often that is is itself not known
   but from the t and d, a Beta(1 + t, 1 + d) with Laplace's prior, so that what was seen has the
-  beta-binomial likelihood B(1 + t + s, 1 + d + n - s) / B(1 + t, 1 + d).
+  beta-binomial likelihood B(1 + t + s, 1 + d + n - s) / B(1 + t, 1 + d);
+- or a habit of doing this very thing, as often as it may be, whatever is so at other times: the
+  likelihood is B(1 + s, 1 + n - s).
 
-The weight is the posterior of the need, need / (need + habit). Without other times and exceptions
-it is the rule of succession, (n + 1) / (n + 2). What varied elsewhere and always held here comes
-near 1, what never varied anywhere sinks towards 1/2, and what varied here, too, below it.
+The weight is need / (need + habit), where either habit is as likely beforehand. Without other
+times and exceptions it is the rule of succession, (n + 1) / (n + 2). What varied elsewhere and
+always held here comes near 1, but only with n; what never varied anywhere stays below `VARIED`,
+however often it was seen; and what varied here, too, falls below 1/2, even a strong habit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from math import exp, lgamma, log
+from math import exp, lgamma, log, log1p
 
 EXCEPTION = 0.01
-"""How probable it is that a need was not met, or not seen to be, before a skill that went well."""
+"""How probable it is that a need was not met, or not seen to be, before a skill that went well,
+where cameras say what was so."""
+
+VARIED = 0.8
+"""Weight that nothing reaches which never was otherwise and was seen as often at other times: half
+of the habits explain at least half of it, however often it was seen."""
 
 
 @dataclass(slots=True)
@@ -77,12 +84,19 @@ def _sum(one: dict[str, int], other: dict[str, int]) -> dict[str, int]:
     return {k: one.get(k, 0) + other.get(k, 0) for k in {*one, *other}}
 
 
-def weight(true: int, seen: int, elsewhere: tuple[int, int] = (0, 0)) -> float:
+def weight(
+    true: int, seen: int, elsewhere: tuple[int, int] = (0, 0), exception: float = EXCEPTION
+) -> float:
     """How likely what held in `true` of `seen` demonstrations is a need; see above."""
     held, not_held = elsewhere
     false = seen - true
-    habit = _log_beta(1 + held + true, 1 + not_held + false) - _log_beta(1 + held, 1 + not_held)
-    odds = habit - false * log(EXCEPTION)
+    if false and not exception:
+        return 0.0
+    usual = _log_beta(1 + held + true, 1 + not_held + false) - _log_beta(1 + held, 1 + not_held)
+    own = _log_beta(1 + true, 1 + false)
+    need = false * log(exception) if false else 0.0
+    likelier, other = max(usual, own), min(usual, own)
+    odds = likelier + log1p(exp(other - likelier)) - log(2) - need
     return 1 / (1 + exp(min(odds, 700.0)))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from forestall.domain.formula import Formula, literals
+from forestall.domain.formula import Formula, Or, literals
 from forestall.domain.phrases import THING, with_articles
 from forestall.domain.recursion import circles
 from forestall.domain.schema import (
@@ -24,7 +24,7 @@ from forestall.domain.schema import (
     Skill,
 )
 from forestall.errors import InputError, UnknownNameError
-from forestall.types.facts import category_of
+from forestall.types.facts import Literal, category_of
 from forestall.types.plan import Plan, Subtask
 
 LOCATED = "located"
@@ -178,6 +178,20 @@ class Domain:
     def containing(self) -> tuple[str, ...]:
         """Relations that say where a thing is, in the order of the file."""
         return tuple(p.name for p in self.relations.values() if p.contains)
+
+    @cached_property
+    def in_any_hand(self) -> str | None:
+        """The derived fact that one of several hands has a thing, None where none says it."""
+        hands, holding = set(self.robot.hands), self.roles.holding
+        for predicate in self.derived.values():
+            said = predicate.definition
+            if len(predicate.parameters) != 1 or not isinstance(said, Or):
+                continue
+            thing = predicate.parameters[0].name
+            ways = {Literal(str(holding), (thing, h)) for h in hands}
+            if len(ways) > 1 and ways == set(said.parts):
+                return predicate.name
+        return None
 
     @cached_property
     def moved(self) -> frozenset[str]:

@@ -12,10 +12,12 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from forestall.assembly.configuration import choices
+from forestall.assembly.judging import always_held
 from forestall.assembly.monitor import DEFAULTS
 from forestall.assembly.parts import Assembly
 from forestall.comparison.needs import needs_of
-from forestall.comparison.preconditions import needed
+from forestall.comparison.preconditions import MiningConfig, needed
+from forestall.comparison.tally import VARIED
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.experiments.conduct import Progress
@@ -44,9 +46,6 @@ from forestall.types.verdict import Decision
 
 NO_DOMAIN = "none"
 ITS_TASK, ALL_TASKS = "its task", "all tasks"
-LEAST_WEIGHT = 0.75
-"""Of what is needed in a learnt domain: what a plan is checked by, as where needs are looked for
-ahead of a plan (`comparison.lacking`)."""
 
 
 NOT_JUDGED = Said(None, False, "not judged")
@@ -56,12 +55,14 @@ def _silent(done: int, total: int, what: str) -> None:
     """Nobody is told how far it is."""
 
 
-def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = False) -> list[Judged]:
-    """Judge every run, without a domain and with each of the household's.
+def judge(foreign: Foreign, progress: Progress = _silent) -> list[Judged]:
+    """Judge every run, with each of the household's domains, and without one.
+
+    With a domain there are the demonstrations of the run's own task; without one also those of all
+    tasks, from which habits of one task can be told.
 
     Args:
         foreign: the household. Programs that are the only one of their task are left out.
-        pooled: also with the demonstrations of all tasks, which takes ten times as long.
         progress: told how far it is.
 
     Raises:
@@ -77,51 +78,52 @@ def judge(foreign: Foreign, progress: Progress = _silent, *, pooled: bool = Fals
         if run.program in made:
             made[run.program].append(run)
     every = {d.name: d for g in foreign.good for d in (g, *foreign.demonstrations(g))}
-    known: dict[str, Domain | None] = {NO_DOMAIN: None, **foreign.domains()}
-    total = len(known) * (1 + pooled) * sum(map(len, made.values()))
+    known: list[tuple[Knowledge, Domain | None]] = [
+        (Knowledge(NO_DOMAIN, ITS_TASK), None),
+        (Knowledge(NO_DOMAIN, ALL_TASKS), None),
+        *((Knowledge(name, ITS_TASK), d) for name, d in foreign.domains().items()),
+    ]
+    total = len(known) * sum(map(len, made.values()))
     judged: list[Judged] = []
-    for runs in made.values():
-        memories = {ITS_TASK: foreign.demonstrations(runs[0])}
-        if pooled:
-            own = runs[0].program
-            memories[ALL_TASKS] = tuple(d for d in every.values() if d.program != own)
-        for memory, shown in memories.items():
-            for name, domain in known.items():
-                geometry = foreign.geometry if domain is None else ()
-                seen = [without(r, geometry).demonstration() for r in shown]
-                own_domain = domain or learn(seen, hands=foreign.hands).domain
-                panel = panel_of(seen, own_domain, learnt=domain is None)
-                for run in runs:
-                    said = said_of(
-                        without(run, geometry), panel, own_domain.skills, domain is not None
-                    )
-                    judged.append(
-                        Judged(run.name, run.program, run.change, Knowledge(name, memory), said)
-                    )
-                progress(len(judged), total, runs[0].program)
+    for program, runs in made.items():
+        for knowledge, domain in known:
+            shown: Sequence[ForeignRun] = foreign.demonstrations(runs[0])
+            if knowledge.memory == ALL_TASKS:
+                shown = [d for d in every.values() if d.program != program]
+            geometry = foreign.geometry if domain is None else ()
+            seen = [without(r, geometry).demonstration() for r in shown]
+            own = domain or learn(seen, hands=foreign.hands).domain
+            panel = panel_of(seen, own, learnt=domain is None, exact=foreign.exact)
+            for run in runs:
+                said = said_of(without(run, geometry), panel, own.skills, domain is not None)
+                judged.append(Judged(run.name, program, run.change, knowledge, said))
+            progress(len(judged), total, program)
     return judged
 
 
 def panel_of(
-    memory: Sequence[Demonstration], domain: Domain, learnt: bool = False
+    memory: Sequence[Demonstration], domain: Domain, learnt: bool = False, *, exact: bool = False
 ) -> dict[str, Judge]:
     """The judges with some demonstrations and the domain that is known, or that they show.
 
-    Without a demonstration only the plan check is left.
+    Without a demonstration only the plan check is left. `exact`: nobody can have seen wrong.
     """
     parts = Assembly(choices(DEFAULTS), domain, memory, {"states": {}})
-    checked = GraphValidator(weighed(domain, memory)) if learnt else parts.part(VALIDATOR)
+    mining = MiningConfig(exception=0.0) if exact else MiningConfig()
+    checked = parts.part(VALIDATOR)
+    if learnt:
+        checked = GraphValidator(weighed(domain, memory, mining))
     if not memory:
         return {PLAN: PlanJudge(checked, PLAN)}
     retriever = parts.part(RETRIEVER)
     return {
         SCORE: DetectorJudge(parts.part(DETECTOR, "scene-graph"), retriever),
-        NEEDS: DetectorJudge(parts.part(DETECTOR, "preconditions"), retriever),
+        NEEDS: DetectorJudge(always_held(parts, mining=mining), retriever),
         PLAN: PlanJudge(checked, PLAN),
     }
 
 
-def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
+def weighed(domain: Domain, shown: Sequence[Demonstration], mining: MiningConfig) -> Domain:
     """A learnt domain without what is as likely a habit.
 
     Of what always held before a skill in its demonstrations what weighs enough is left: a plan that
@@ -136,11 +138,11 @@ def weighed(domain: Domain, shown: Sequence[Demonstration]) -> Domain:
         for s in d.steps
     }
     for subtask in alike.values():
-        mined = needed(counts, subtask, None, None)
+        mined = needed(counts, subtask, None, None, mining)
         heavy[subtask.skill] |= {
             p.literal
             for p in mined
-            if p.weight >= LEAST_WEIGHT
+            if p.weight >= VARIED
             and (
                 p.literal.predicate not in domain.derived
                 or p.literal.predicate == domain.roles.hand_empty

@@ -1,15 +1,17 @@
 """Mined needs and effects against those that a household's own domain says: precision and recall.
 
 Called by `bench third-party`; calls `learning` and the mining of the comparison. From ten
-demonstrations of a skill a domain is learnt; its needs, the mined ones that weigh more than habit,
-and its effects are compared with the skill's formulas. Facts are compared over the places of the
-arguments. What never changes (that a thing can be opened) is part of no scene here and is left out
-on both sides. A fact is right where some demonstrated use needs it, and missing where every
-demonstrated use needs it, since what a skill needs may differ between kinds of things.
+demonstrations of a skill a domain is learnt; its needs, the mined ones, those of them that are
+likely, and its effects are compared with the skill's formulas. Facts are compared over the places
+of the arguments, derived ones by what they say and not by their name. What never changes (that a
+thing can be opened) is part of no scene here and is left out on both sides. A fact is right where
+some demonstrated use needs it, and missing where every demonstrated use needs it, since what a
+skill needs may differ between kinds of things.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -18,10 +20,11 @@ from typing import Any
 import numpy as np
 
 from forestall.comparison.needs import Needs
-from forestall.comparison.preconditions import needed
+from forestall.comparison.preconditions import MiningConfig, needed
 from forestall.domain.formula import TRUE, And, Every, Formula, Not, Or, normal, show
 from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
+from forestall.experiments.third_party import without
 from forestall.learning.learn import learn
 from forestall.seams.others import Foreign
 from forestall.statistics.intervals import Metric, rate
@@ -37,8 +40,13 @@ DRAWS = 5
 """How often they are drawn for each skill."""
 
 SEED = 20_262
+LIKELY_FROM = 0.9
+"""Weight of a mined need that is more than a guess: nine demonstrations and a contrast."""
+
 HELD, FREE = "in hand", "hand free"
-LEARNT, MINED, EFFECTS = "needs, as learnt", "needs, weighed", "effects"
+LEARNT, MINED, LIKELY, EFFECTS = "needs, as learnt", "needs, mined", "needs, likely", "effects"
+
+_VARIABLE = re.compile(r"\?\w+")
 
 Fact = tuple[str, tuple[int, ...], str]
 """Predicate, places of its arguments among the skill's, value."""
@@ -50,7 +58,7 @@ class Compared:
 
     Args:
         skill: which.
-        what: learnt needs, mined ones or effects.
+        what: needs that were learnt, mined ones, likely ones, or effects.
         mined: what was found.
         right: those of them that some demonstrated use needs.
         true: what every demonstrated use needs.
@@ -71,7 +79,7 @@ class NeedsRow:
 
     Args:
         domain: whose formulas are taken for true.
-        what: learnt needs, mined ones or effects.
+        what: needs that were learnt, mined ones, likely ones, or effects.
         precision: share of mined facts that are right.
         recall: share of true facts that were found.
         skills: how many skills had enough demonstrations.
@@ -96,7 +104,8 @@ class NeedsRow:
 
 def compare(foreign: Foreign, runs: Sequence[ForeignRun]) -> dict[str, list[Compared]]:
     """Every skill with enough demonstrations, against each of the household's domains."""
-    shown = [r.demonstration() for r in runs]
+    shown = [without(r, foreign.geometry).demonstration() for r in runs]
+    mining = MiningConfig(exception=0.0) if foreign.exact else MiningConfig()
     truths = foreign.domains()
     skills = sorted({s.subtask.skill for d in shown for s in d.steps})
     found: dict[str, list[Compared]] = {name: [] for name in truths}
@@ -107,7 +116,7 @@ def compare(foreign: Foreign, runs: Sequence[ForeignRun]) -> dict[str, list[Comp
         random = np.random.default_rng([SEED, *skill.encode()])
         for _ in range(DRAWS):
             drawn = [able[i] for i in random.choice(len(able), ENOUGH, replace=False)]
-            mined = _mined(skill, drawn, foreign.hands)
+            mined = _mined(skill, drawn, foreign.hands, mining)
             for name, domain in truths.items():
                 if skill in domain.skills:
                     found[name] += _compared(skill, drawn, domain, mined)
@@ -118,7 +127,7 @@ def table(compared: Mapping[str, Sequence[Compared]]) -> list[NeedsRow]:
     """Precision and recall over all skills, with intervals drawn by skill."""
     rows = []
     for domain, several in compared.items():
-        for what in (LEARNT, MINED, EFFECTS):
+        for what in (LEARNT, MINED, LIKELY, EFFECTS):
             own = [c for c in several if c.what == what]
             units = [c.skill for c in own]
             precision = rate([len(c.right) for c in own], [len(c.mined) for c in own], units)
@@ -131,20 +140,27 @@ def table(compared: Mapping[str, Sequence[Compared]]) -> list[NeedsRow]:
 
 
 def _mined(
-    skill: str, shown: Sequence[Demonstration], hands: Sequence[str]
+    skill: str, shown: Sequence[Demonstration], hands: Sequence[str], mining: MiningConfig
 ) -> dict[str, frozenset[Fact]]:
     domain = learn(shown, hands=hands).domain
     schema, counts = domain.skills[skill], Needs.of(shown, domain)
     places = {p.name: i for i, p in enumerate(schema.parameters)}
     literals = [n.formula for n in schema.needs if isinstance(n.formula, Literal)]
-    weighed: set[Literal] = set()
+    weighed: dict[Literal, float] = {}
     uses = [s.subtask for d in shown for s in d.steps if s.subtask.skill == skill]
     for subtask in {tuple(counts.kinds(u).values()): u for u in uses}.values():
-        weighed |= {p.literal for p in needed(counts, subtask, None, None)}
+        for p in needed(counts, subtask, None, None, mining):
+            weighed[p.literal] = max(p.weight, weighed.get(p.literal, 0.0))
+    likely = [x for x, w in weighed.items() if w >= LIKELY_FROM]
     effects = [f for e in schema.effects for f in e.facts]
     return {
         what: frozenset(_facts(several, places, domain))
-        for what, several in ((LEARNT, literals), (MINED, weighed), (EFFECTS, effects))
+        for what, several in (
+            (LEARNT, literals),
+            (MINED, weighed),
+            (LIKELY, likely),
+            (EFFECTS, effects),
+        )
     }
 
 
@@ -157,11 +173,24 @@ def _facts(
         args = literal.args
         if literal.predicate == domain.roles.hand_empty:
             yield (FREE, (), literal.value)
-        elif literal.predicate == domain.roles.holding and args[1] in hands:
+        elif literal.predicate == domain.in_any_hand or (
+            literal.predicate == domain.roles.holding and args[1] in hands
+        ):
             if args[0] in places:
                 yield (HELD, (places[args[0]],), literal.value)
         elif all(a in places for a in args):
-            yield (literal.predicate, tuple(places[a] for a in args), literal.value)
+            said = _said(literal.predicate, domain)
+            yield (said, tuple(places[a] for a in args), literal.value)
+
+
+def _said(predicate: str, domain: Domain) -> str:
+    """What a predicate says, whatever it and its variables are called."""
+    known = domain.derived.get(predicate)
+    if known is None or known.definition is None:
+        return predicate
+    names = dict.fromkeys(_VARIABLE.findall(show(known.definition)))
+    order = {name: f"?{i}" for i, name in enumerate(names)}
+    return _VARIABLE.sub(lambda m: order[m[0]], show(known.definition))
 
 
 # --- what is true ---------------------------------------------------------------------------------
@@ -177,7 +206,7 @@ def _compared(
     uses = [s.subtask for d in shown for s in d.steps if s.subtask.skill == skill]
     needs = [_needs(schema, use, domain) for use in dict.fromkeys(uses)]
     some, every = frozenset.union(*needs), frozenset.intersection(*needs)
-    for what in (LEARNT, MINED):
+    for what in (LEARNT, MINED, LIKELY):
         yield _one(skill, what, mined[what], some, every, domain)
     sure, maybe = _effects(schema, domain)
     yield _one(skill, EFFECTS, mined[EFFECTS], sure | maybe, sure, domain)
@@ -234,16 +263,6 @@ def _ways(formula: Formula, names: Mapping[str, str], domain: Domain) -> list[_W
         holds = literal.predicate in domain.kinds(domain.canonical(category_of(own[0])))
         denied = isinstance(formula, Not) or literal.value == "false"
         return [frozenset()] if holds is not denied else []
-    if isinstance(literal, Literal):
-        held = domain.roles.holding
-        known = domain.derived.get(literal.predicate)
-        about_hand = known is not None and known.name != domain.roles.hand_empty
-        if about_hand and known is not None and known.definition is not None:
-            inner = known.definition
-            if isinstance(inner, Or) and all(
-                isinstance(x, Literal) and x.predicate == held for x in inner.parts
-            ):
-                return [frozenset({Literal(str(held), (literal.args[0], GRIPPER), literal.value)})]
     return [frozenset({formula})]
 
 

@@ -53,6 +53,33 @@ class Lack:
 
 
 @dataclass(frozen=True, slots=True)
+class Inside:
+    """A derived fact about one thing: it is in or on nothing that is in some state.
+
+    Args:
+        name: of the derived predicate.
+        relation: of a thing to where it is.
+        attribute: of that place.
+        value: that the place may not have.
+    """
+
+    name: str
+    relation: str
+    attribute: str
+    value: str
+
+    def holds(self, graph: SceneGraph, node: ObjectNode) -> bool:
+        """Whether it is true of a node."""
+        return not any(
+            r.subject == node.id
+            and r.predicate == self.relation
+            and (place := graph.get(r.object)) is not None
+            and place.state(self.attribute) == self.value
+            for r in graph.relations
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Vocabulary:
     """The words of some demonstrations.
 
@@ -64,8 +91,10 @@ class Vocabulary:
         values: attribute → its values, the most frequent first.
         attributes: category → its attributes.
         lacks: derived facts, that nothing is related to a thing.
+        insides: derived facts, that a thing is in nothing that is shut, or the like.
         vacant: which of them says that nothing is in or on it, None where nothing has a place.
         hand_empty: the derived fact that a hand is free, None where nothing was ever held.
+        in_hand: the derived fact that one of several hands has a thing, None where there are none.
         exclusive: whether nothing was ever in two places at once, a hand being one.
         takers: relation → categories that took things in it.
         moved: categories of what was ever seen in a hand, or to change its place.
@@ -78,8 +107,10 @@ class Vocabulary:
     values: dict[str, tuple[str, ...]]
     attributes: dict[str, tuple[str, ...]]
     lacks: tuple[Lack, ...]
+    insides: tuple[Inside, ...]
     vacant: str | None
     hand_empty: str | None
+    in_hand: str | None
     exclusive: bool
     takers: dict[str, frozenset[str]]
     moved: frozenset[str]
@@ -103,9 +134,12 @@ class Vocabulary:
         for variable, node in nodes.values():
             found |= {Literal(a, (variable,), v) for a, v in node.states if v is not None}
             found |= {Literal(x.name, (variable,)) for x in self.lacks if x.holds(graph, node)}
+            found |= {Literal(x.name, (variable,)) for x in self.insides if x.holds(graph, node)}
         for r in graph.relations:
             if r.subject in nodes and r.object in ends:
                 found.add(Literal(r.predicate, (ends[r.subject], ends[r.object])))
+            if self.in_hand and r.subject in nodes and r.object in self.hands:
+                found.add(Literal(self.in_hand, (ends[r.subject],)))
         full = {r.object for r in graph.relations if r.predicate == self.holding}
         if self.hand_empty is not None and not full.issuperset(self.hands):
             found.add(Literal(self.hand_empty, ()))
@@ -136,6 +170,8 @@ class Vocabulary:
             )
         for lack in self.lacks:
             found[lack.name] = _derived(lack, lack.name == self.vacant)
+        for inside in self.insides:
+            found[inside.name] = _of_place(inside)
         if self.hand_empty is not None and self.holding is not None:
             held = Parameter("?thing")
             free = [Not(Some((held,), Literal(self.holding, (held.name, h)))) for h in self.hands]
@@ -145,6 +181,17 @@ class Vocabulary:
                 definition=free[0] if len(free) == 1 else Or(tuple(free)),
                 words="a hand is free",
                 opposite="no hand is free",
+            )
+        if self.in_hand is not None and self.holding is not None:
+            thing = Parameter("?thing")
+            ways = [Literal(self.holding, (thing.name, h)) for h in self.hands]
+            found[self.in_hand] = Predicate(
+                self.in_hand,
+                PredicateKind.DERIVED,
+                (thing,),
+                definition=Or(tuple(ways)),
+                words="{0} is in a hand",
+                opposite="{0} is in no hand",
             )
         return found
 
@@ -209,8 +256,10 @@ def vocabulary(found: Sequence[Trace], hands: Sequence[str] | None = None) -> Vo
         values=_values(graphs),
         attributes=_attributes(graphs),
         lacks=lacks,
+        insides=_insides(found, containing, names),
         vacant=lacks[0].name if containing else None,
         hand_empty=_free("hand_empty", names) if holding and known else None,
+        in_hand=_free("in_hand", names) if holding and len(known) > 1 else None,
         exclusive=bool(places) and _exclusive(graphs, places),
         takers=taken,
         moved=frozenset(x for names in moving for x in names),
@@ -227,6 +276,31 @@ def _lacks(
             found.append(Lack(_free(f"nothing_{name}", taken), (name,), 1))
         found.append(Lack(_free(f"{name}_nothing", taken), (name,), 0))
     return tuple(found)
+
+
+def _insides(
+    found: Sequence[Trace], containing: tuple[str, ...], taken: set[str]
+) -> tuple[Inside, ...]:
+    """Of places, the states that shut things in: skills end them, and move nothing before that."""
+    ended: set[tuple[str, str, str]] = set()
+    moved: set[tuple[str, str, str]] = set()
+    for t in found:
+        if t.after is None:
+            continue
+        before, after = set(t.before.relations), set(t.after.relations)
+        for r in before | after:
+            place, later = t.before.get(r.object), t.after.get(r.object)
+            if r.predicate not in containing or place is None or later is None:
+                continue
+            for attribute, value in place.states:
+                if value is not None and (r in before) is not (r in after):
+                    moved.add((r.predicate, attribute, value))
+                elif value is not None and later.state(attribute) not in (value, None):
+                    ended.add((r.predicate, attribute, value))
+    return tuple(
+        Inside(_free(f"{relation}_nothing_{value}", taken), relation, attribute, value)
+        for relation, attribute, value in sorted(ended - moved)
+    )
 
 
 def _free(name: str, taken: set[str]) -> str:
@@ -249,6 +323,21 @@ def _derived(lack: Lack, vacant: bool) -> Predicate:
         definition=related[0] if len(related) == 1 else And(related),
         words="{0} is empty" if vacant else f"{thing[0]}nothing{thing[1]}",
         opposite="{0} is not empty" if vacant else f"{thing[0]}something{thing[1]}",
+    )
+
+
+def _of_place(inside: Inside) -> Predicate:
+    own, other = Parameter("?thing"), Parameter("?other")
+    there = Literal(inside.relation, (own.name, other.name))
+    so = Literal(inside.attribute, (other.name,), inside.value)
+    spoken = f"{_spoken(inside.relation)} {{}} whose {inside.attribute} is {inside.value}"
+    return Predicate(
+        inside.name,
+        PredicateKind.DERIVED,
+        (own,),
+        definition=Not(Some((other,), And((there, so)))),
+        words=f"{{0}} {spoken.format('nothing')}",
+        opposite=f"{{0}} {spoken.format('something')}",
     )
 
 

@@ -18,6 +18,8 @@ class Foreign(Protocol):
     """Node ids of the hands in its scenes."""
     geometry: tuple[str, ...]
     """Relations that only say where things happen to be: left out where there is no domain."""
+    exact: bool
+    """Whether its scenes are what is so, and not what somebody saw."""
 
     @property
     def good(self) -> Sequence[ForeignRun]:

@@ -45,6 +45,7 @@ class Household:
     name = "virtualhome"
     hands: tuple[str, ...] = tuple(HANDS)
     geometry: tuple[str, ...] = ("obj_next_to",)
+    exact = True
 
     def __init__(
         self, packages: Path | None = None, development: bool = False, each: int = EACH
