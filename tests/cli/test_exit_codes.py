@@ -102,6 +102,18 @@ def test_a_package_that_cannot_be_imported_is_no_alarm(tmp_path: Path) -> None:
     assert "internal error: RuntimeError: damaged" in done.stderr
 
 
+@pytest.mark.parametrize("arguments", [["bench", "all", "--help"], ["parts"]])
+def test_a_reader_that_has_seen_enough_is_no_fault(arguments: list[str]) -> None:
+    code = "import sys; from forestall.cli.main import main; main(sys.argv[1:])"
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as run:
+        assert run.stdout is not None and run.stderr is not None
+        run.stdout.close()
+        assert run.stderr.read() == b""
+    assert run.returncode == 0
+
+
 @pytest.mark.parametrize(
     "arguments", [["rnu"], ["tasks", "--sed", "1"], ["compare"], ["check", "x", "--threshold", "a"]]
 )

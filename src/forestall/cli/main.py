@@ -44,6 +44,8 @@ def call(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except BaseException as error:  # noqa: BLE001 - a crash must not look like an answer
+        if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
+            return 0  # how rich says it
         if debug:
             import traceback
 
