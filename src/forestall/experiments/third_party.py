@@ -18,6 +18,7 @@ from forestall.assembly.parts import Assembly
 from forestall.comparison.needs import needs_of
 from forestall.comparison.preconditions import MiningConfig, needed
 from forestall.comparison.tally import VARIED
+from forestall.domain.formula import And, Formula, Not, Some
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.experiments.conduct import Progress
@@ -130,6 +131,11 @@ def weighed(domain: Domain, shown: Sequence[Demonstration], mining: MiningConfig
     is checked by habits is refused wherever somebody else has other ones. Left out are the kinds of
     things that a skill was shown with, and that nothing is related to a thing, but for a free hand.
     """
+    lacks = {
+        name
+        for name, predicate in domain.derived.items()
+        if name != domain.roles.hand_empty and _is_lack(predicate.definition)
+    }
     counts = needs_of(shown, domain)
     heavy: dict[str, set[Literal]] = {name: set() for name in domain.skills}
     alike = {
@@ -140,13 +146,7 @@ def weighed(domain: Domain, shown: Sequence[Demonstration], mining: MiningConfig
     for subtask in alike.values():
         mined = needed(counts, subtask, None, None, mining)
         heavy[subtask.skill] |= {
-            p.literal
-            for p in mined
-            if p.weight >= VARIED
-            and (
-                p.literal.predicate not in domain.derived
-                or p.literal.predicate == domain.roles.hand_empty
-            )
+            p.literal for p in mined if p.weight >= VARIED and p.literal.predicate not in lacks
         }
     skills = {
         name: replace(
@@ -157,6 +157,15 @@ def weighed(domain: Domain, shown: Sequence[Demonstration], mining: MiningConfig
         for name, skill in domain.skills.items()
     }
     return replace(domain, skills=skills)
+
+
+def _is_lack(definition: Formula | None) -> bool:
+    """Whether a fact is that nothing has some relations to a thing."""
+    parts = definition.parts if isinstance(definition, And) else (definition,)
+    return all(
+        isinstance(p, Not) and isinstance(p.part, Some) and isinstance(p.part.part, Literal)
+        for p in parts
+    )
 
 
 def without(run: ForeignRun, geometry: Sequence[str]) -> ForeignRun:
