@@ -10,8 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from forestall import open_memory
+from forestall.assembly.sources import demonstrations_from
 from forestall.cli.main import call
 from forestall.domain.load import read_domain, shipped
+from stranger import TWELVE
 
 PDDL = Path(__file__).parents[1] / "domain" / "pddl"
 
@@ -70,6 +73,33 @@ def test_export_to_pddl_leaves_nothing_out_unasked(capsys: pytest.CaptureFixture
     assert call([*export, "--without-processes", "--without-makers"]) == 0
     assert capsys.readouterr().out.startswith("(define (domain household)\n")
     assert call(["domain", "export", "household", "--format", "yaml"]) == 2
+
+
+def test_a_draft_says_what_each_need_weighs_and_leaves_out_habits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    memory, out = tmp_path / "pegs.db", tmp_path / "pegs.toml"
+    with open_memory(memory, create=True) as opened:
+        for demonstration in demonstrations_from(TWELVE):
+            opened.add(demonstration)
+    assert call(["domain", "learn", str(memory), "--out", str(out)]) == 0
+    whole = read_domain(out.read_text(), "pegs.toml")
+    assert call(["domain", "learn", str(memory), "--least", "0.8"]) == 0
+    text = capsys.readouterr().out.split("\n", 1)[1]
+    lines = [line[2:] for line in text.splitlines() if line.startswith("# insert")]
+    assert lines[0] == f"{'insert':<20} 0.96  held_by(?peg, gripper)"
+    assert lines[-1] == f"{'insert':<20} 0.77  vacant(?hole)  (left out)", "it never varied"
+    left = [line for line in lines if line.endswith("(left out)")]
+    kept = read_domain(text, "pegs.toml")
+    assert {str(n.formula) for n in kept.skill("unscrew").needs} == {
+        "hand_empty()",
+        "thread(?lid)=tight",
+    }
+    assert (
+        len(kept.skill("insert").needs) == len(lines) - len(left) < len(whole.skill("insert").needs)
+    )
+    assert call(["domain", "learn", str(memory), "--least", "2"]) == 2
+    assert "--least 2.0: a weight is between 0 and 1" in capsys.readouterr().err
 
 
 def test_help_loads_no_domain() -> None:

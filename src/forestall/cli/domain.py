@@ -12,6 +12,7 @@ from forestall.cli.flags import Flag, Json
 from forestall.cli.listing import say
 
 if TYPE_CHECKING:
+    from forestall.assembly.weighing import Weights
     from forestall.domain.model import Domain
 
 
@@ -63,33 +64,54 @@ def show(name: str, /) -> int:
 
 
 @domain.command
-def learn(*sources: Path, out: Path | None = None, name: str = "learnt") -> int:
+def learn(*sources: Path, out: Path | None = None, name: str = "learnt", least: float = 0.0) -> int:
     """Draft a domain file from demonstrations alone, to be corrected by hand.
+
+    It begins with what each need weighs: how likely it is one, and no habit of who demonstrated.
 
     Args:
         sources: memory files, folders of runs, demonstrations that somebody wrote (JSON).
         out: the file to write; printed by default.
         name: of the domain.
+        least: leave out needs that weigh less, 0 to 1; what never varied weighs less than 0.8.
     """
     from forestall.assembly.sources import demonstrations_from
+    from forestall.assembly.weighing import likely, weights
     from forestall.domain.toml_out import domain_toml
     from forestall.errors import InputError
     from forestall.learning.learn import learn as learnt_from
 
     if not sources:
         raise InputError("no source was named: give a memory file, or a folder of demonstrations")
-    learnt = learnt_from(demonstrations_from(sources), name=name)
+    if not 0 <= least <= 1:
+        raise InputError(f"--least {least}: a weight is between 0 and 1")
+    shown = demonstrations_from(sources)
+    learnt = learnt_from(shown, name=name)
+    weighed = weights(learnt.domain, shown)
+    found = likely(learnt.domain, weighed, least)
     said = "".join(f"# - {limit}\n" for limit in learnt.limits)
     text = (
         f"# Learnt from {learnt.demonstrations} demonstrations; read and correct it. "
-        f"What is not known:\n{said}\n{domain_toml(learnt.domain)}"
+        f"What is not known:\n{said}{_weighed(learnt.domain, weighed, least)}\n{domain_toml(found)}"
     )
     if out is None:
         print(text, end="")
         return 0
     out.write_text(text, encoding="utf-8")
-    print(f"{out}: {_sentence(learnt.domain)}")
+    print(f"{out}: {_sentence(found)}")
     return 0
+
+
+def _weighed(learnt: Domain, weighed: Weights, least: float) -> str:
+    """A comment: the needs of each skill with their weights, those that were left out last."""
+    lines = ["# What a need weighs is how likely it is one, and no habit of who demonstrated:\n"]
+    for skill in learnt.skills.values():
+        told = {str(fact): weight for fact, weight in weighed[skill.name].items()}
+        of = {fact: told.get(fact, 0.0) for fact in (str(n.formula) for n in skill.needs)}
+        for formula, weight in sorted(of.items(), key=lambda x: (-x[1], x[0])):
+            left = "  (left out)" if weight < least else ""
+            lines.append(f"# {skill.name:<20} {weight:.2f}  {formula}{left}\n")
+    return "".join(lines)
 
 
 @domain.command

@@ -15,10 +15,8 @@ from forestall.assembly.configuration import choices
 from forestall.assembly.judging import always_held
 from forestall.assembly.monitor import DEFAULTS
 from forestall.assembly.parts import Assembly
-from forestall.comparison.needs import needs_of
-from forestall.comparison.preconditions import MiningConfig, needed
-from forestall.comparison.tally import VARIED
-from forestall.domain.formula import And, Formula, Not, Some
+from forestall.assembly.weighing import plainer, weights
+from forestall.comparison.preconditions import MiningConfig
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.experiments.conduct import Progress
@@ -37,7 +35,6 @@ from forestall.planning.validate import GraphValidator
 from forestall.seams.others import Foreign
 from forestall.strategies.judges import DetectorJudge, Judge, PlanJudge
 from forestall.types.demonstration import Demonstration
-from forestall.types.facts import Literal
 from forestall.types.foreign import ForeignRun
 from forestall.types.graph import SceneGraph
 from forestall.types.runtime import BoundaryContext
@@ -113,7 +110,7 @@ def panel_of(
     mining = MiningConfig(exception=0.0) if exact else MiningConfig()
     checked = parts.part(VALIDATOR)
     if learnt:
-        checked = GraphValidator(weighed(domain, memory, mining))
+        checked = GraphValidator(plainer(domain, weights(domain, memory, mining)))
     if not memory:
         return {PLAN: PlanJudge(checked, PLAN)}
     retriever = parts.part(RETRIEVER)
@@ -122,50 +119,6 @@ def panel_of(
         NEEDS: DetectorJudge(always_held(parts, mining=mining), retriever),
         PLAN: PlanJudge(checked, PLAN),
     }
-
-
-def weighed(domain: Domain, shown: Sequence[Demonstration], mining: MiningConfig) -> Domain:
-    """A learnt domain without what is as likely a habit.
-
-    Of what always held before a skill in its demonstrations what weighs enough is left: a plan that
-    is checked by habits is refused wherever somebody else has other ones. Left out are the kinds of
-    things that a skill was shown with, and that nothing is related to a thing, but for a free hand.
-    """
-    lacks = {
-        name
-        for name, predicate in domain.derived.items()
-        if name != domain.roles.hand_empty and _is_lack(predicate.definition)
-    }
-    counts = needs_of(shown, domain)
-    heavy: dict[str, set[Literal]] = {name: set() for name in domain.skills}
-    alike = {
-        (s.subtask.skill, *counts.kinds(s.subtask).values()): s.subtask
-        for d in shown
-        for s in d.steps
-    }
-    for subtask in alike.values():
-        mined = needed(counts, subtask, None, None, mining)
-        heavy[subtask.skill] |= {
-            p.literal for p in mined if p.weight >= VARIED and p.literal.predicate not in lacks
-        }
-    skills = {
-        name: replace(
-            skill,
-            parameters=tuple(replace(p, kind=None) for p in skill.parameters),
-            needs=tuple(n for n in skill.needs if n.formula in heavy[name]),
-        )
-        for name, skill in domain.skills.items()
-    }
-    return replace(domain, skills=skills)
-
-
-def _is_lack(definition: Formula | None) -> bool:
-    """Whether a fact is that nothing has some relations to a thing."""
-    parts = definition.parts if isinstance(definition, And) else (definition,)
-    return all(
-        isinstance(p, Not) and isinstance(p.part, Some) and isinstance(p.part.part, Literal)
-        for p in parts
-    )
 
 
 def without(run: ForeignRun, geometry: Sequence[str]) -> ForeignRun:

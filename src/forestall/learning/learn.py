@@ -178,7 +178,7 @@ def _need(literal: Literal, predicate: Predicate, found: Sequence[Trace]) -> Nee
 
 def _limits(by_skill: dict[str, list[Trace]], skills: dict[str, Skill]) -> tuple[str, ...]:
     found = [
-        "what always held before a skill is taken for needed: habit and need cannot be told apart",
+        "what always held before a skill is taken for needed: what never varied may be a habit",
         "what can be shut, what happens by itself and what is dangerous is not known",
         "what is no argument of a subtask, and on or in what an argument lies, is not judged",
     ]
