@@ -303,3 +303,24 @@ def test_the_room_is_seen_from_the_height_that_is_stated() -> None:
     assert EYE[2, 3] == 1.5
     high = replace(room(), robot_position_world_m=(0.1, -0.9, -9.0))
     assert refused(high) == {"pose"}
+
+
+def test_where_the_ground_meets_walls_without_a_mask_tells_nothing() -> None:
+    corner = [
+        Solid("Floor-1", (-4.0, -4.0, -0.02), (4.0, 1.2, 0.0)),
+        Solid("Wall-1", (-4.0, 1.2, 0.0), (4.0, 1.25, 2.6)),
+        Solid("Wall-2", (0.9, -4.0, 0.0), (0.95, 1.2, 2.6)),
+        Solid("Arm-1", (0.1, -0.4, 1.15), (0.5, -0.3, 1.2)),
+        Solid("Arm-2", (0.1, -0.4, 1.3), (0.5, -0.3, 1.35)),
+    ]
+    seen = detected(observed(corner, looking((-0.2, -0.9, 1.5), (0.5, 1.0, 0.9)), time_s=2.0))
+    rng = np.random.default_rng(0)
+
+    def floor_alone(frame: Frame) -> Frame:
+        floor = tuple(d for d in frame.detections or () if d.category == "Floor")
+        rgb = np.clip(frame.rgb + rng.integers(0, 20, frame.rgb.shape), 0, 255).astype(np.uint8)
+        return replace(frame, detections=floor, rgb=rgb)
+
+    alone = with_frame(seen, floor_alone)
+    assert "masks" in {f.what for f in inspect(alone) if f.refuses}, "as if it were a thing"
+    assert refused(alone) == set()

@@ -3,7 +3,7 @@
 Where a thing ends depth bends: the outlines of right masks lie on bends of inverse depth (which is
 linear over every plane, so that a floor seen at a grazing angle has none). If the outlines lie on
 them much better after a shift, or after turning the masks over, masks and depth do not belong
-together.
+together. Where the ground ends and no mask begins tells nothing: it meets walls in a crease.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def judge_masks(
         return
     yield from _shares(look, index, domain, limits)
     if look.outlined:
-        yield from _alignment(look, index, limits)
+        yield from _alignment(look, index, domain, limits)
 
 
 def _shares(
@@ -50,8 +50,10 @@ def _shares(
             )
 
 
-def _alignment(look: Coarse, index: int, limits: GateConfig) -> Iterator[Finding]:
-    outline = _outlines(look)
+def _alignment(
+    look: Coarse, index: int, domain: Domain | None, limits: GateConfig
+) -> Iterator[Finding]:
+    outline = _outlines(look, domain)
     if int(outline.sum()) < limits.min_edges:
         return
     bends = _bends(look, limits.edge_step)
@@ -78,9 +80,12 @@ def _alignment(look: Coarse, index: int, limits: GateConfig) -> Iterator[Finding
         )
 
 
-def _outlines(look: Coarse) -> Cells:
-    """(h, w) 1 on both sides of where one mask meets another or none."""
+def _outlines(look: Coarse, domain: Domain | None) -> Cells:
+    """(h, w) 1 on both sides of where one mask meets another or, unless it is the ground's, none."""
     labels = look.labels
+    if domain is not None:
+        ground = [domain.is_a(c, domain.roles.ground) for c in look.categories]
+        labels = np.where(np.append(ground, False)[labels], -1, labels)
     cells: Cells = np.zeros(labels.shape, dtype=np.float32)
     across = labels[:, 1:] != labels[:, :-1]
     down = labels[1:] != labels[:-1]
