@@ -81,7 +81,7 @@ def _alignment(
 
 
 def _outlines(look: Coarse, domain: Domain | None) -> Cells:
-    """(h, w) 1 on both sides of where one mask meets another or, unless it is the ground's, none."""
+    """(h, w) 1 on both sides of where a mask meets another or, unless the ground has it, none."""
     labels = look.labels
     if domain is not None:
         ground = [domain.is_a(c, domain.roles.ground) for c in look.categories]
