@@ -37,7 +37,7 @@ from forestall.perception.tracks import (
     vec,
 )
 from forestall.perception.unproject import Points, robust_box
-from forestall.perception.unseen import look_over, unseen_m2
+from forestall.perception.unseen import Taken, look_over, unseen_m2
 from forestall.types.facts import Change, Truth, category_of
 from forestall.types.graph import Box, ObjectNode, Relation, SceneGraph, Seen
 from forestall.types.observation import GripperState, Observation, Vec3
@@ -344,7 +344,8 @@ class SceneMemory:
 
     def graph(self) -> SceneGraph:
         """The scene as believed now."""
-        nodes = [self._node(t) for t in self.tracks.values()]
+        taken = Taken.of(self.tracks.values())
+        nodes = [self._node(t, taken) for t in self.tracks.values()]
         nodes += [
             ObjectNode(h.name, "Gripper", centroid_m=vec(np.asarray(h.position_world_m)))
             for h in self._hands
@@ -356,7 +357,7 @@ class SceneMemory:
         ]
         return SceneGraph(tuple(nodes), tuple(self._relations), hidden=tuple(hidden))
 
-    def _node(self, track: Track) -> ObjectNode:
+    def _node(self, track: Track, taken: Taken) -> ObjectNode:
         category = self._domain.find(track.category)
         attributes: tuple[str, ...] = () if category is None else category.attributes
         states = {a: track.states.get(a) for a in attributes}
@@ -372,7 +373,7 @@ class SceneMemory:
             last_seen_s=track.last_seen_s,
             feature=track.feature,
             presumed=tuple((a, v) for a, v in track.presumed.items() if states.get(a, v) is None),
-            unseen_m2=unseen_m2(track, self.tracks.values(), self._domain, self._config),
+            unseen_m2=unseen_m2(track, taken, self._domain, self._config),
         )
 
     # --- small questions ------------------------------------------------------------------------

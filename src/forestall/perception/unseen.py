@@ -7,6 +7,7 @@ seen once a view's ray reaches a point close over it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -45,14 +46,35 @@ def look_over(
         place.shown = np.union1d(place.shown, _keys(cells[seen]))
 
 
-def unseen_m2(
-    place: Track, tracks: Iterable[Track], domain: Domain, config: PerceptionConfig
-) -> float:
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken:
+    """Where everything is that is located, for all places of one graph.
+
+    Args:
+        ids: of the things.
+        low_m: (n, 3) corners of their boxes.
+        high_m: (n, 3).
+    """
+
+    ids: npt.NDArray[np.object_]
+    low_m: Points
+    high_m: Points
+
+    @classmethod
+    def of(cls, tracks: Iterable[Track]) -> Taken:
+        """Of everything that is known."""
+        there = [t for t in tracks if t.points_world_m is not None]
+        low = np.array([t.low_m for t in there], dtype=np.float64).reshape(-1, 3)
+        high = np.array([t.high_m for t in there], dtype=np.float64).reshape(-1, 3)
+        return cls(np.array([t.id for t in there], dtype=object), low, high)
+
+
+def unseen_m2(place: Track, taken: Taken, domain: Domain, config: PerceptionConfig) -> float:
     """Area in square metres that was never seen, in pieces on which a small thing has room.
 
     Args:
         place: 0 for what is no open place, or not located.
-        tracks: everything that is known: what is under a thing is not unseen.
+        taken: where everything is: what is under a thing is not unseen.
         domain: whether things stand on its top, or in it.
         config: thresholds.
     """
@@ -64,15 +86,18 @@ def unseen_m2(
     unseen = ~np.isin(_keys(lattice), place.shown)
     if not unseen.any():
         return 0.0
-    first, shape, level_m = lattice[0, 0], unseen.shape, _level_m(place, domain)
-    for other in tracks:
-        above = other.low_m[2] > place.high_m[2] + config.cell_m
-        if other is place or other.points_world_m is None or above or other.high_m[2] < level_m:
-            continue
-        a = np.rint(other.low_m[:2] / config.cell_m).astype(int) - first
-        b = np.rint(other.high_m[:2] / config.cell_m).astype(int) - first
-        (x0, y0), (x1, y1) = np.clip(a, 0, shape), np.clip(b, 0, shape)
+    first, shape = lattice[0, 0], unseen.shape
+    above = taken.low_m[:, 2] > place.high_m[2] + config.cell_m
+    below = taken.high_m[:, 2] < _level_m(place, domain)
+    over = (taken.ids != place.id) & ~above & ~below
+    a, b = (
+        np.clip(np.rint(corner[over, :2] / config.cell_m).astype(int) - first, 0, shape)
+        for corner in (taken.low_m, taken.high_m)
+    )
+    for (x0, y0), (x1, y1) in zip(a.tolist(), b.tolist(), strict=True):
         unseen[x0:x1, y0:y1] = False
+    if not unseen.any():
+        return 0.0
     piece = np.ones((config.piece_cells, config.piece_cells), dtype=bool)
     return float(np.count_nonzero(binary_opening(unseen, structure=piece))) * config.cell_m**2
 
