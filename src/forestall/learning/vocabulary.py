@@ -23,6 +23,8 @@ TAKES = "takes_"
 TAKER = "takes_things"
 OTHER = "other"
 PLACE = "place"
+_MISTAKEN = 0.05
+"""Share of moves of things that may be seen wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,7 +285,7 @@ def _insides(
 ) -> tuple[Inside, ...]:
     """Of places, the states that shut things in: skills end them, and move nothing before that."""
     ended: set[tuple[str, str, str]] = set()
-    moved: set[tuple[str, str, str]] = set()
+    moved: Counter[tuple[str, str, str]] = Counter()
     for t in found:
         if t.after is None:
             continue
@@ -294,12 +296,16 @@ def _insides(
                 continue
             for attribute, value in place.states:
                 if value is not None and (r in before) is not (r in after):
-                    moved.add((r.predicate, attribute, value))
+                    moved[r.predicate, attribute, value] += 1
                 elif value is not None and later.state(attribute) not in (value, None):
                     ended.add((r.predicate, attribute, value))
+    every: Counter[tuple[str, str]] = Counter()
+    for (relation, attribute, _), times in moved.items():
+        every[relation, attribute] += times
     return tuple(
         Inside(_free(f"{relation}_nothing_{value}", taken), relation, attribute, value)
-        for relation, attribute, value in sorted(ended - moved)
+        for relation, attribute, value in sorted(ended)
+        if moved[relation, attribute, value] <= _MISTAKEN * every[relation, attribute]
     )
 
 
