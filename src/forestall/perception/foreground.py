@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -68,13 +67,12 @@ def own_pixels(
         if kept is labels:
             kept = labels.copy()
         rows, columns = np.nonzero(gone)
-        top, left = rim.top, rim.left
-        around = range(1 - step, step)
-        for down, across in product(around, around):
-            y = np.clip((rows + top) * step + down, 0, labels.shape[0] - 1)
-            x = np.clip((columns + left) * step + across, 0, labels.shape[1] - 1)
-            same = labels[y, x] == rim.labels[rows, columns]
-            kept[y[same], x[same]] = -1
+        near = np.arange(1 - step, step)
+        y = np.clip((rows + rim.top)[:, None, None] * step + near[:, None], 0, len(labels) - 1)
+        x = np.clip((columns + rim.left)[:, None, None] * step + near, 0, labels.shape[1] - 1)
+        at = (y * labels.shape[1] + x).ravel()
+        same = labels.take(at) == np.repeat(rim.labels[rows, columns], near.size**2)
+        np.put(kept, at[same], -1)
     return kept
 
 
