@@ -149,6 +149,14 @@ def test_what_shuts_a_thing_in_is_learnt_from_when_things_were_moved() -> None:
     assert "cup-1 lies in something whose door is locked" in refused.reason
 
 
+def test_what_is_seen_of_a_thing_that_no_demonstration_had_counts() -> None:
+    for door, may in (("locked", False), ("unlocked", True)):
+        shown = {"cup-1": {}, "chest-1": {"door": door}, "left_gripper": {}, "right_gripper": {}}
+        graph = scene_graph({"objects": shown, "relations": ["cup-1 lies_in chest-1"]})
+        after = apply(state_of(graph, TWO_HANDED), Subtask.parse("take(cup-1)"))
+        assert isinstance(after, Refusal) is not may, (door, after)
+
+
 def test_a_draft_with_two_hands_is_written_and_read_back() -> None:
     assert read_domain(domain_toml(TWO_HANDED), "draft.toml") == TWO_HANDED
 

@@ -13,7 +13,7 @@ from forestall.types.graph import SceneGraph
 
 
 def state_of(graph: SceneGraph, domain: Domain) -> State:
-    """Read a scene graph; what is of a category that the domain lacks is a thing, no more.
+    """Read a scene graph; what is of a category that the domain lacks is a thing with what is seen.
 
     An unobserved attribute takes what is presumed of it, else its default, and is listed in
     `assumed`, as is the emptiness of every hidden container. A thing with neither box nor place
@@ -37,6 +37,9 @@ def state_of(graph: SceneGraph, domain: Domain) -> State:
                 value = presumed.get(attribute, default)
                 assumed.add(Literal(attribute, (node.id,), value))
             state.values[node.id, attribute] = value
+        for attribute, seen in node.states:  # also of what nobody knew to have such a state
+            if seen is not None and attribute in domain.attributes:
+                state.values[node.id, attribute] = seen
         loose = node.box_m is None and node.id not in placed
         if loose and roles.fixture not in category.tags:
             lost.add(node.id)
