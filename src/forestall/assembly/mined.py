@@ -17,7 +17,8 @@ from forestall.assembly.sources import scoped
 from forestall.comparison.corrections import Correction, Corrections, stale
 from forestall.comparison.expectations import WEIGHT, Expected
 from forestall.comparison.lifting import evaluate
-from forestall.comparison.preconditions import mine
+from forestall.comparison.needs import needs_of
+from forestall.comparison.preconditions import needed
 from forestall.domain.formula import show
 from forestall.domain.model import Domain
 from forestall.domain.schema import Skill
@@ -294,7 +295,9 @@ def _kind(subtask: Subtask, domain: Domain) -> Subtask:
 
 def _group(known: Remembered, subtask: Subtask, task: str, uses: Sequence[Reference]) -> Group:
     ordered = sorted(uses, key=lambda u: u.task != task)
-    mined = mine(ordered, known.domain, subtask=ordered[0].subtask, task=task)
+    step = next((u.index for u in ordered if u.task == task), None)
+    counts = needs_of(known.demonstrations, known.domain)
+    mined = needed(counts, ordered[0].subtask, task, step)
     valid = known.corrections.over(mined, subtask, task, known.domain)
     return Group(subtask, task, tuple(ordered), mined, valid)
 
