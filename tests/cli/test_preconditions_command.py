@@ -74,6 +74,20 @@ def test_one_subtask_with_the_demonstrations_that_say_so(
     assert "surface(hole)=clean\n  held in 12 demonstrations:" in capsys.readouterr().out
 
 
+def test_a_list_a_draft_and_the_detector_weigh_alike(
+    memory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    listed = {fact: row["weight"] for fact, row in rows(capsys, memory).items()}
+    assert listed["insert: held_by(?peg, gripper)"] > 0.9 > listed[CLEAN], (
+        "the hole was never dirty"
+    )
+    verdict = Monitor.from_demonstrations(memory).check(DIRTY, INSERT).verdict
+    assert verdict is not None and verdict.score is not None
+    assert 1 - verdict.score == pytest.approx(listed[CLEAN], abs=1e-3)
+    assert call(["domain", "learn", str(memory)]) == 0
+    assert f"{listed[CLEAN]:.2f}  {CLEAN.removeprefix('insert: ')}\n" in capsys.readouterr().out
+
+
 def test_corrections_are_a_layer_that_the_monitor_reads(
     memory: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,7 +43,7 @@ class Options:
         quick: a tenth of it, with fewer demonstrations and fewer strategies on each case: by
             its own reckoning eight minutes.
         demonstrations: of each task in the honest household, each another way to do it (1 to 32);
-            8 by default, 2 in a quick experiment.
+            8 by default, 1 in a quick experiment.
         out: folder of the results; what is finished in it is not run again.
         engine: local (processes), ray, or inline (this process, one after the other).
         address: of a running Ray cluster; a local one is started by default.

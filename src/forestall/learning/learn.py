@@ -179,7 +179,8 @@ def _need(literal: Literal, predicate: Predicate, found: Sequence[Trace]) -> Nee
 def _limits(by_skill: dict[str, list[Trace]], skills: dict[str, Skill]) -> tuple[str, ...]:
     found = [
         "what always held before a skill is taken for needed: what never varied may be a habit",
-        "what can be shut, what happens by itself and what is dangerous is not known",
+        "what can be shut is known only where a move of a thing showed it",
+        "what happens by itself and what is dangerous is not known",
         "what is no argument of a subtask, and on or in what an argument lies, is not judged",
     ]
     for name, of in by_skill.items():
