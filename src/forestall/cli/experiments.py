@@ -41,7 +41,7 @@ class Options:
         part: of the cases of each set in `all`, from all tasks in turn; 0.05 by default, which is
             an hour on two cores, 1 for every case, which takes many.
         quick: a tenth of it, with fewer demonstrations and fewer strategies on each case: by
-            its own reckoning eight minutes.
+            its own reckoning eight minutes, timed once 17.
         demonstrations: of each task in the honest household, each another way to do it (1 to 32);
             8 by default, 1 in a quick experiment.
         out: folder of the results; what is finished in it is not run again.
