@@ -182,15 +182,12 @@ class Domain:
     @cached_property
     def in_any_hand(self) -> str | None:
         """The derived fact that one of several hands has a thing, None where none says it."""
-        hands, holding = set(self.robot.hands), self.roles.holding
-        for predicate in self.derived.values():
-            said = predicate.definition
-            if len(predicate.parameters) != 1 or not isinstance(said, Or):
-                continue
-            thing = predicate.parameters[0].name
-            ways = {Literal(str(holding), (thing, h)) for h in hands}
-            if len(ways) > 1 and ways == set(said.parts):
-                return predicate.name
+        for known in self.derived.values():
+            if len(known.parameters) == 1 and isinstance(known.definition, Or):
+                thing, holding = known.parameters[0].name, str(self.roles.holding)
+                ways = {Literal(holding, (thing, hand)) for hand in self.robot.hands}
+                if len(ways) > 1 and ways == set(known.definition.parts):
+                    return known.name
         return None
 
     @cached_property

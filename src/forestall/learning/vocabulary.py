@@ -10,11 +10,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from forestall.domain.formula import And, Not, Or, Parameter, Some
+from forestall.domain.formula import Not, Or, Parameter, Some
 from forestall.domain.schema import Category, Predicate, PredicateKind
+from forestall.learning.absences import Inside, Lack, lacking, placed, spoken
 from forestall.learning.traces import Trace, graphs_of, hands_of
 from forestall.types.facts import Literal
-from forestall.types.graph import ObjectNode, Relation, SceneGraph
+from forestall.types.graph import Relation, SceneGraph
 from forestall.types.plan import Subtask
 
 FIXED = "fixed"
@@ -25,60 +26,6 @@ OTHER = "other"
 PLACE = "place"
 _MISTAKEN = 0.05
 """Share of moves of things that may be seen wrong."""
-
-
-@dataclass(frozen=True, slots=True)
-class Lack:
-    """A derived fact about one thing: nothing is related to it, in some relations.
-
-    Args:
-        name: of the derived predicate.
-        relations: that nothing may have to it.
-        position: of the thing in them, 0 or 1.
-        of: categories that it is said of; None: all.
-    """
-
-    name: str
-    relations: tuple[str, ...]
-    position: int
-    of: frozenset[str] | None = None
-
-    def holds(self, graph: SceneGraph, node: ObjectNode) -> bool:
-        """Whether it is true of a node."""
-        if self.of is not None and node.category not in self.of:
-            return False
-        return not any(
-            node.id == (r.subject, r.object)[self.position]
-            for r in graph.relations
-            if r.predicate in self.relations
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Inside:
-    """A derived fact about one thing: it is in or on nothing that is in some state.
-
-    Args:
-        name: of the derived predicate.
-        relation: of a thing to where it is.
-        attribute: of that place.
-        value: that the place may not have.
-    """
-
-    name: str
-    relation: str
-    attribute: str
-    value: str
-
-    def holds(self, graph: SceneGraph, node: ObjectNode) -> bool:
-        """Whether it is true of a node."""
-        return not any(
-            r.subject == node.id
-            and r.predicate == self.relation
-            and (place := graph.get(r.object)) is not None
-            and place.state(self.attribute) == self.value
-            for r in graph.relations
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,8 +108,8 @@ class Vocabulary:
                 contains=contains,
                 group=group if placing else None,
                 offered_by=TAKES + name if contains else "",
-                words=f"{{0}} {_spoken(name)} {{1}}",
-                opposite=f"{{0}} not {_spoken(name)} {{1}}",
+                words=f"{{0}} {spoken(name)} {{1}}",
+                opposite=f"{{0}} not {spoken(name)} {{1}}",
             )
         for name, values in self.values.items():
             parameters = (Parameter("?thing"),)
@@ -171,9 +118,9 @@ class Vocabulary:
                 name, PredicateKind.ATTRIBUTE, parameters, several, material=False
             )
         for lack in self.lacks:
-            found[lack.name] = _derived(lack, lack.name == self.vacant)
+            found[lack.name] = lacking(lack, lack.name == self.vacant)
         for inside in self.insides:
-            found[inside.name] = _of_place(inside)
+            found[inside.name] = placed(inside)
         if self.hand_empty is not None and self.holding is not None:
             held = Parameter("?thing")
             free = [Not(Some((held,), Literal(self.holding, (held.name, h)))) for h in self.hands]
@@ -314,41 +261,6 @@ def _free(name: str, taken: set[str]) -> str:
         name += "_"
     taken.add(name)
     return name
-
-
-def _derived(lack: Lack, vacant: bool) -> Predicate:
-    own, other = Parameter("?thing"), Parameter("?other")
-    ends = (own.name, other.name) if lack.position == 0 else (other.name, own.name)
-    related = tuple(Not(Some((other,), Literal(r, ends))) for r in lack.relations)
-    spoken = _spoken(lack.relations[0])
-    thing = (f"{{0}} {spoken} ", "") if lack.position == 0 else ("", f" {spoken} {{0}}")
-    return Predicate(
-        lack.name,
-        PredicateKind.DERIVED,
-        (own,),
-        definition=related[0] if len(related) == 1 else And(related),
-        words="{0} is empty" if vacant else f"{thing[0]}nothing{thing[1]}",
-        opposite="{0} is not empty" if vacant else f"{thing[0]}something{thing[1]}",
-    )
-
-
-def _of_place(inside: Inside) -> Predicate:
-    own, other = Parameter("?thing"), Parameter("?other")
-    there = Literal(inside.relation, (own.name, other.name))
-    so = Literal(inside.attribute, (other.name,), inside.value)
-    spoken = f"{_spoken(inside.relation)} {{}} whose {inside.attribute} is {inside.value}"
-    return Predicate(
-        inside.name,
-        PredicateKind.DERIVED,
-        (own,),
-        definition=Not(Some((other,), And((there, so)))),
-        words=f"{{0}} {spoken.format('nothing')}",
-        opposite=f"{{0}} {spoken.format('something')}",
-    )
-
-
-def _spoken(predicate: str) -> str:
-    return predicate.replace("_", " ")
 
 
 def _changed(found: Iterable[Trace]) -> dict[str, frozenset[str]]:
