@@ -24,7 +24,7 @@ from forestall.types.plan import Subtask
 
 @pytest.fixture
 def pictures(tmp_path: Path) -> Path:
-    """Six grey crops of closed fridges, which say nothing."""
+    """Six grey crops of closed fridges, which say nothing; one is held, one disturbed."""
     folder = tmp_path / "pictures"
     (folder / "test").mkdir(parents=True)
     values = np.full((6, len(ATTRIBUTES)), -1, dtype=np.int8)
@@ -35,7 +35,9 @@ def pictures(tmp_path: Path) -> Path:
         category=np.array(["Fridge"] * 6),
         values=values,
         area=np.full(6, 900, dtype=np.int32),
-        frame=np.arange(6, dtype=np.int32),
+        frame=np.array([0, 1, 2, 3, 4, 4], dtype=np.int32),
+        held=np.array([True, *[False] * 5]),
+        seen=np.array([""] * 5 + ["all of it"]),
     )
     return folder
 
@@ -60,10 +62,12 @@ def test_figures_tables_and_page_of_the_shipped_encoder(
     assert call(["encoder", "test", "--pictures", str(pictures), "--out", str(out), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["encoder"] == TwoTowerEncoder().name
-    assert data["states"]["overall"]["figures"]["n"] == 6
+    assert data["states"]["overall"]["figures"]["n"] == 5
+    told = {c["name"]: c["group"]["figures"]["n"] for c in data["conditions"]}
+    assert told == {"in the hand": 1, "as drawn, of the pictures below": 1, "all of it": 1}
     assert data["size_bytes"] < 10_000_000
     assert {w["group"] for w in data["words"]} == {"spelling", "meaning"}
-    assert shards.read(pictures, "test").frame.tolist() == list(range(6))
+    assert shards.read(pictures, "test").frame.tolist() == [0, 1, 2, 3, 4, 4]
     names = {p.name for p in out.iterdir()}
     assert names >= {"index.html", "measurement.md", "figures.csv", "confusion.csv"}
 

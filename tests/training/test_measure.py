@@ -21,6 +21,7 @@ from forestall.training.measure import (
     share,
 )
 from forestall.training.measure_tables import (
+    Condition,
     as_json,
     confusion_csv,
     figures_csv,
@@ -296,8 +297,10 @@ def test_tables_carry_the_same_figures(tmp_path: Path) -> None:
     text = markdown(m)
     assert "| open | 11 | 100.0 % (71.5 to 100.0) | 81.8 % (48.2 to 97.7) | 69.4 % |" in text
     assert "| closed | 8 | 1 | 0 |" in text
-    paths = write_tables(m, tmp_path / "new")
+    paths = write_tables(m, [Condition("in the hand", m.overall)], tmp_path / "new")
     assert sorted(p.name for p in paths) == sorted(p.name for p in (tmp_path / "new").iterdir())
     data = json.loads((tmp_path / "new" / "measurement.json").read_text(encoding="utf-8"))
     assert data == as_json(m)
+    told = (tmp_path / "new" / "measurement.md").read_text(encoding="utf-8")
+    assert "| in the hand | 13 |" in told and "By condition" not in text
     assert data["attributes"][1]["confusion"] == [[8, 1, 0], [1, 1, 0]]

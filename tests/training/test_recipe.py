@@ -50,6 +50,8 @@ def paint(folder: Path, split: str, count: int) -> None:
         values=np.array(values, dtype=np.int8),
         area=np.full(len(pixels), 900, dtype=np.int32),
         frame=np.array(frame, dtype=np.int32),
+        held=np.zeros(len(pixels), dtype=bool),
+        seen=np.full(len(pixels), ""),
     )
     (folder / shards.OPTIONS_NAME).write_text(json.dumps({"painted": True}), encoding="utf-8")
 

@@ -39,6 +39,24 @@ def test_a_shard_holds_crops_with_what_is_true_of_them(folder: Path) -> None:
     assert (crops.pixels[..., 3].reshape(len(crops.area), -1).max(axis=1) > 0).all()
 
 
+def test_some_test_pictures_are_seen_through_worse_eyes_too(tmp_path: Path) -> None:
+    config = PictureConfig(1, 1, 1, 1, SceneConfig(views=5, things=(6, 8), held=1.0), "embree")
+    make_shard(tmp_path, config, "test", 0)
+    crops = read(tmp_path, "test")
+    assert set(crops.seen.tolist()) == {"", *shards.SENSED}
+    assert set(crops.frame[crops.seen != ""].tolist()) == {0}
+    assert crops.held.any() and not crops.held[crops.category == ""].any()
+    drawn, blurred = crops.seen == "", crops.seen == "motion blur of 5 px"
+    first = drawn & (crops.frame == 0) & (crops.category != "")
+    assert crops.category[first].tolist() == crops.category[blurred].tolist()
+    assert (crops.values[first] == crops.values[blurred]).all()
+    colours, masks = crops.pixels[..., :3], crops.pixels[..., 3]
+    assert (masks[first] == masks[blurred]).all()
+    assert (colours[first] != colours[blurred]).any()
+    outlined = crops.seen == "outlines up to 3 px off"
+    assert not np.array_equal(crops.area[outlined], crops.area[first])
+
+
 def test_the_same_seed_draws_the_same_pictures(folder: Path) -> None:
     artist = Artist(shipped("household"), SMALL.scene, "embree")
     first, second = list(artist.pictures(2_000_000))

@@ -10,6 +10,7 @@ import dataclasses
 import io
 import json
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,15 @@ DEFINITION = (
     "answered; over several attributes the mean over the attributes. Intervals are exact 95 % ones."
 )
 
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """All answers about some of the crops, or about crops through worse eyes."""
+
+    name: str
+    group: Group
+
+
 _HEAD = ("n", "answered", "accuracy", "balanced accuracy", "ECE", "ECE, all answered", "silent")
 
 
@@ -40,8 +50,8 @@ def as_json(measurement: Measurement) -> dict[str, Any]:
     return data
 
 
-def markdown(measurement: Measurement) -> str:
-    """Everything as tables: overall, by attribute, category, both, mask area, and confusions."""
+def markdown(measurement: Measurement, conditions: Sequence[Condition] = ()) -> str:
+    """Everything as tables: overall, by condition, attribute, category, mask area, confusions."""
     overall = measurement.overall
     parts = [
         f"{measurement.crops:,} crops, {overall.figures.n:,} answers. {DEFINITION}",
@@ -55,7 +65,9 @@ def markdown(measurement: Measurement) -> str:
         for g in (overall, *measurement.attributes)
         for band, f in g.sizes
     ]
+    harder = [(c.name, *_cells(c.group.figures)) for c in conditions]
     for title, first, rows in (
+        *((("By condition", ("condition",), harder),) if harder else ()),
         ("By attribute", ("attribute",), attributes),
         ("By category", ("category",), categories),
         ("By attribute and category", ("attribute", "category"), pairs),
@@ -86,12 +98,14 @@ def confusion_csv(measurement: Measurement) -> str:
     return _csv(CONFUSION_COLUMNS, rows)
 
 
-def write_tables(measurement: Measurement, folder: Path) -> tuple[Path, ...]:
+def write_tables(
+    measurement: Measurement, conditions: Sequence[Condition], folder: Path
+) -> tuple[Path, ...]:
     """Write measurement.json, measurement.md, figures.csv and confusion.csv; their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = {
         JSON_NAME: json.dumps(as_json(measurement), indent=1) + "\n",
-        MARKDOWN_NAME: markdown(measurement),
+        MARKDOWN_NAME: markdown(measurement, conditions),
         FIGURES_NAME: figures_csv(measurement),
         CONFUSION_NAME: confusion_csv(measurement),
     }

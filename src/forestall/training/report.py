@@ -22,7 +22,7 @@ from forestall.files import replace_file
 from forestall.training import shards, words, zero_shot
 from forestall.training.examine import Vectors, answers, vectors
 from forestall.training.measure import measure
-from forestall.training.measure_tables import as_json, write_tables
+from forestall.training.measure_tables import Condition, as_json, write_tables
 from forestall.training.page import Synonym, write_page
 
 Progress = Callable[[int, int, str], None]
@@ -41,10 +41,13 @@ def examine(
         ModelFileError: the encoder cannot be read.
     """
     encoder = TwoTowerEncoder(model)
-    there = shards.read(pictures, split)
-    rows = vectors(encoder, there, progress)
+    everything = shards.read(pictures, split)
+    all_rows = vectors(encoder, everything, progress)
+    drawn = everything.seen == ""
+    there, rows = everything.where(drawn), all_rows[drawn]
     said = answers(encoder, rows, there, load_domain("household"))
     found = measure(said)
+    harder = conditions(encoder, all_rows, everything)
     questions = zero_shot.new_questions(encoder, rows, there)
     things = []
     if (pictures / "unseen").is_dir():
@@ -64,11 +67,12 @@ def examine(
         "frame_ms": took_ms,
         "category_accuracy": named,
         "states": as_json(found),
+        "conditions": [asdict(c) for c in harder],
         "unseen things": [asdict(z) for z in things],
         "unseen questions": [asdict(z) for z in questions],
         "words": [asdict(w) for w in near],
     }
-    write_tables(found, out)
+    write_tables(found, harder, out)
     replace_file(out / "encoder.json", (json.dumps(data, indent=2) + "\n").encode())
     facts = {
         "encoder": encoder.name,
@@ -82,6 +86,28 @@ def examine(
     inner = there.pixels[:, edge : edge + INPUT_PIXELS, edge : edge + INPUT_PIXELS]
     page = write_page(found, inner, said, out / "index.html", facts, near, [*things, *questions])
     return data, page
+
+
+def conditions(
+    encoder: TwoTowerEncoder, rows: Vectors, crops: shards.Crops
+) -> tuple[Condition, ...]:
+    """How states are read of what is held, and of the same things through worse eyes.
+
+    What is seen through a sensor is to be held against the row "as drawn" of the same pictures.
+    """
+    drawn = crops.seen == ""
+    again = np.isin(crops.frame, np.unique(crops.frame[~drawn]))
+    parts = {
+        "in the hand": drawn & crops.held,
+        "as drawn, of the pictures below": drawn & again,
+        **{name: crops.seen == name for name in shards.SENSED},
+    }
+    domain = load_domain("household")
+    return tuple(
+        Condition(name, measure(answers(encoder, rows[some], crops.where(some), domain)).overall)
+        for name, some in parts.items()
+        if (crops.values[some] >= 0).any()
+    )
 
 
 def category_accuracy(encoder: TwoTowerEncoder, rows: Vectors, there: shards.Crops) -> float:

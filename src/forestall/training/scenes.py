@@ -68,12 +68,13 @@ class SceneConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One frame and the truth about what is in it."""
+    """One frame and the truth about what is in it; `held` names what is in the hand."""
 
     seed: int
     view: int
     frame: Frame
     states: dict[str, dict[str, str]]
+    held: str | None = None
 
 
 @dataclass(slots=True)
@@ -105,11 +106,11 @@ class Artist:
         renderer = make_renderer(self.renderer, world.model, world.appearance, intrinsics)
         for view in range(self.config.views):
             rng = np.random.default_rng([seed, 1, view])
-            camera = self._compose(world, rng)
+            camera, held = self._compose(world, rng)
             frame = renderer.render(world.data, camera)
             names = [n for n in world.bodies.states if n in world.bodies.present]
             states = {n: self.visible_states(world, n) for n in names}
-            yield Picture(seed, view, frame, states)
+            yield Picture(seed, view, frame, states, held)
 
     def visible_states(self, world: KitchenWorld, name: str) -> dict[str, str]:
         """True states that a picture can show; of a broken thing only that it is broken."""
@@ -172,8 +173,10 @@ class Artist:
             full.add(chosen)
         return (chosen,)
 
-    def _compose(self, world: KitchenWorld, rng: np.random.Generator) -> npt.NDArray[np.float64]:
-        """Draw states, move something, go somewhere and look; returns the camera's pose."""
+    def _compose(
+        self, world: KitchenWorld, rng: np.random.Generator
+    ) -> tuple[npt.NDArray[np.float64], str | None]:
+        """Draw states, move something, go somewhere and look: the camera's pose, what is held."""
         world.reset()
         bodies = world.bodies
         here = sorted(n for n in bodies.states if n in bodies.present)
@@ -192,13 +195,13 @@ class Artist:
         if target in things and rng.uniform() < self.config.held:
             world.hold(target)
             world.drive_to(here[int(rng.integers(len(here)))])
-            return world.look_at(self._about(world.gripper_position_world_m, 0.15, rng))
+            return world.look_at(self._about(world.gripper_position_world_m, 0.15, rng)), target
         if rng.uniform() < self.config.aside:
             tilt = float(np.clip(rng.normal(SCAN_TILT_RAD, 0.2), 0.0, 1.1))
-            return world.camera_to_world(float(rng.uniform(-1.2, 1.2)), tilt)
+            return world.camera_to_world(float(rng.uniform(-1.2, 1.2)), tilt), None
         if rng.uniform() < self.config.aside:  # something else, seen from here
             target = here[int(rng.integers(len(here)))]
-        return world.look_at(self._about(bodies.centre(target), self.config.aim_m, rng))
+        return world.look_at(self._about(bodies.centre(target), self.config.aim_m, rng)), None
 
     def _draw(self, attribute: str, value: str, rng: np.random.Generator) -> str:
         """A random value; what is decided by the category stays."""

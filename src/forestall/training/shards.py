@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,11 @@ from forestall.processes import pool
 from forestall.reading.arrays import NUMBERS, read_npz
 from forestall.reading.documents import read_json
 from forestall.reading.fields import Field
+from forestall.sensors import Errors, Sensor
 from forestall.training.questions import ATTRIBUTES
 from forestall.training.scenes import Artist, Picture, SceneConfig
+from forestall.types.facts import category_of
+from forestall.types.observation import GripperState, Mask, Observation, Rgb
 
 Progress = Callable[[int, int, str], None]
 
@@ -56,6 +59,17 @@ SELDOM = {
     "TVStand": 0.3,
 }
 """Share of the crops that are kept of what is in view all the time."""
+
+SENSED = {
+    "outlines up to 3 px off": Errors(outline_px=3),
+    "exposure off by up to 25 %, colours with noise": Errors(gain=0.25, colour_noise=8.0),
+    "motion blur of 5 px": Errors(blur_px=5),
+    "all of it": Errors(outline_px=3, gain=0.25, colour_noise=8.0, blur_px=5),
+}
+"""Through what some of the test pictures are seen once more."""
+
+SENSED_EVERY = 5
+"""Of so many views of a scene one."""
 
 VALUES = {a: {v: k for k, v in enumerate(values)} for a, values in ATTRIBUTES.items()}
 
@@ -96,6 +110,8 @@ class Crops:
         values: (n, attributes) int8, the index of the value in ATTRIBUTES, -1 where it has none.
         area: (n) mask pixels in the frame.
         frame: (n) which frame of the shard (or of the split) it was cut from.
+        held: (n) bool, whether the thing is in the hand.
+        seen: (n) through what: "" as it was drawn, or a name of SENSED.
     """
 
     pixels: npt.NDArray[np.uint8]
@@ -103,6 +119,12 @@ class Crops:
     values: npt.NDArray[np.int8]
     area: npt.NDArray[np.int32]
     frame: npt.NDArray[np.int32]
+    held: npt.NDArray[np.bool_]
+    seen: npt.NDArray[np.str_]
+
+    def where(self, keep: npt.NDArray[np.bool_]) -> Crops:
+        """Some of them."""
+        return Crops(**{name: getattr(self, name)[keep] for name in self.__dataclass_fields__})
 
 
 def make(out: Path, config: PictureConfig, workers: int, progress: Progress) -> None:
@@ -154,7 +176,9 @@ def make_shard(out: Path, config: PictureConfig, split: str, first: int) -> Path
     for seed in range(PICTURE_SEEDS[split] + first, PICTURE_SEEDS[split] + first + count):
         for picture in artist.pictures(seed):
             found = _rows(picture, frames)
-            artist.shown.update(r.category for r in found if r.category)
+            if split == "test" and picture.view % SENSED_EVERY == 0:
+                found += _sensed(picture, found)
+            artist.shown.update(r.category for r in found if r.category and not r.seen)
             rows += found
             frames += 1
     path = _path(out, split, first)
@@ -167,6 +191,8 @@ def make_shard(out: Path, config: PictureConfig, split: str, first: int) -> Path
             values=np.array([r.values for r in rows], dtype=np.int8),
             area=np.array([r.area for r in rows], dtype=np.int32),
             frame=np.array([r.frame for r in rows], dtype=np.int32),
+            held=np.array([r.held for r in rows], dtype=bool),
+            seen=np.array([r.seen for r in rows], dtype=np.str_),
         )
     return path
 
@@ -219,25 +245,57 @@ def unseen_things() -> Domain:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Row:
     pixels: npt.NDArray[np.uint8]
+    name: str
     category: str
     values: list[int]
     area: int
     frame: int
+    held: bool = False
+    seen: str = ""
 
 
-def _rows(picture: Picture, frame: int) -> list[_Row]:
-    """The crops of one picture, the whole frame last."""
+def _rows(picture: Picture, number: int) -> list[_Row]:
+    """The crops of one picture as it was drawn, the whole frame last."""
     rgb = picture.frame.rgb
     rng = np.random.default_rng([picture.seed, 2, picture.view])
     rows = []
     for d in InstanceSegmenter().segment(picture.frame):
         if rng.uniform() >= SELDOM.get(d.category, 1.0) or d.instance is None:
             continue
-        pixels = crop(rgb, d.mask, STORED_PIXELS, STORED_MARGIN)
-        values = _values(picture.states[d.instance])
-        rows.append(_Row(pixels, d.category, values, int(d.mask.sum()), frame))
-    rows.append(_Row(whole(rgb, STORED_PIXELS), "", _values({}), int(rgb[..., 0].size), frame))
+        rows.append(_row(picture, rgb, d.mask, d.instance, number))
+    pixels = whole(rgb, STORED_PIXELS)
+    rows.append(_Row(pixels, "", "", _values({}), int(rgb[..., 0].size), number))
     return rows
+
+
+def _sensed(picture: Picture, drawn: Sequence[_Row]) -> list[_Row]:
+    """The same things as a sensor gives them; what its masks have lost is left out."""
+    rows = []
+    for k, (seen, errors) in enumerate(SENSED.items()):
+        sensor = Sensor(errors)
+        sensor.reset(picture.seed * 100 + picture.view * 10 + k)
+        now = Observation(
+            frames=(picture.frame,), gripper=GripperState(None, (0.0, 0.0, 0.0)), time_s=0.0
+        )
+        (frame,) = sensor.sense(now).frames
+        masks = {d.instance: d.mask for d in InstanceSegmenter().segment(frame)}
+        for row in drawn:
+            if row.name in masks:
+                found = _row(picture, frame.rgb, masks[row.name], row.name, row.frame)
+                rows.append(replace(found, seen=seen))
+    return rows
+
+
+def _row(picture: Picture, rgb: Rgb, mask: Mask, name: str, number: int) -> _Row:
+    return _Row(
+        pixels=crop(rgb, mask, STORED_PIXELS, STORED_MARGIN),
+        name=name,
+        category=category_of(name),
+        values=_values(picture.states[name]),
+        area=int(mask.sum()),
+        frame=number,
+        held=name == picture.held,
+    )
 
 
 def _values(states: Mapping[str, str]) -> list[int]:
@@ -261,7 +319,12 @@ def options(folder: Path) -> dict[str, Any]:
 def _same_options(out: Path, config: PictureConfig) -> None:
     """See that the folder's options are these, how many scenes there are apart."""
     path = out / OPTIONS_NAME
-    wanted: dict[str, Any] = asdict(config) | {"values": ATTRIBUTES, "seldom": SELDOM}
+    wanted: dict[str, Any] = asdict(config) | {
+        "values": ATTRIBUTES,
+        "seldom": SELDOM,
+        "sensed": {name: asdict(errors) for name, errors in SENSED.items()},
+        "sensed every": SENSED_EVERY,
+    }
     wanted = json.loads(json.dumps(wanted))
     if path.exists():
         there = options(out)

@@ -65,7 +65,7 @@ def new_things(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list[Ze
     chosen = np.isin(crops.category, found.categories)
     if not chosen.any():
         return []
-    part = _chosen(crops, chosen)
+    part = crops.where(chosen)
     said = answers(encoder, rows[chosen], part, found.domain)
     return [
         _row(g, found.domain[str(g.category)].words, str(g.attribute), forced)
@@ -86,7 +86,7 @@ def new_questions(encoder: TwoTowerEncoder, rows: Vectors, crops: Crops) -> list
             continue
         values = np.full((int(chosen.sum()), len(order)), -1, dtype=np.int8)
         values[:, order.index(alias.attribute)] = new[chosen]
-        part = replace(_chosen(crops, chosen), values=values)
+        part = replace(crops.where(chosen), values=values)
         said = answers(encoder, rows[chosen], part, _asking(found.domain, alias))
         values_of = {alias.attribute: found.domain.values(alias.attribute)}
         for g, forced in _pairs(said, values_of):
@@ -122,7 +122,3 @@ def _asking(domain: Domain, alias: Alias) -> Domain:
         c: replace(domain[c], attributes=(alias.attribute,), defaults=()) for c in alias.categories
     }
     return replace(domain, categories={**domain.categories, **changed})
-
-
-def _chosen(crops: Crops, rows: npt.NDArray[np.bool_]) -> Crops:
-    return Crops(**{name: getattr(crops, name)[rows] for name in Crops.__dataclass_fields__})
