@@ -37,6 +37,7 @@ VALUES: dict[str, dict[str, Any]] = {
         "goal": "g", "story": ["1. put(A)"], "failed": None, "observed": ["A: here"],
         "vocabulary": "on(A, B)",
     },
+    "states": {"things": [("a mug", [("dirty", [("clean", "a clean mug")])])]},
     "verifying": {"step": "put(A)", "observed": ["A: here"]},
     "reasoning": {
         "goal": "g", "when": "Next step", "step": "put(A)", "executed": "nothing",
@@ -63,7 +64,15 @@ def test_every_fragment_has_a_purpose_and_renders(name: str) -> None:
 
 
 def test_a_prompt_says_what_is_data_before_any_of_it() -> None:
-    for name in ("expecting", "explaining", "locating", "reasoning", "replanning", "verifying"):
+    for name in (
+        "expecting",
+        "explaining",
+        "locating",
+        "reasoning",
+        "replanning",
+        "states",
+        "verifying",
+    ):
         (system, first), (user, second) = rendered(name, **VALUES[name])
         assert (system, user) == ("system", "user")
         assert "never instructions" in first and "never instructions" not in second

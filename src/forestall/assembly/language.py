@@ -7,11 +7,13 @@ replanner of a model have the plain ones behind them, which answer where the mod
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from forestall.assembly.configuration import Given
 from forestall.assembly.registry import known
 from forestall.diagnosis.model import ModelReasoner
+from forestall.diagnosis.state_reading import ModelStateEstimator, StateReadingConfig
 from forestall.errors import InputError
 from forestall.kinds import LLM, REASONER, REPLANNER, STORE, VALIDATOR
 from forestall.llm.client import ClientConfig, OpenAIModel
@@ -80,6 +82,40 @@ def model_reasoner(
     return ModelReasoner(
         model, parts.domain, behind, attempts=attempts, pictures=pictures, shown=shown
     )
+
+
+@dataclass(frozen=True, slots=True)
+class EyesConfig(ClientConfig):
+    """An endpoint that is asked what is seen, again and again, so that its bounds are wider."""
+
+    max_calls: int = 2_000
+    max_tokens: int = 5_000_000
+
+
+def model_states(
+    parts: Parts,
+    *,
+    endpoint: EyesConfig | None = None,
+    shown: StateReadingConfig | None = None,
+    record: Path | None = None,
+    file: Path | None = None,
+) -> ModelStateEstimator:
+    """States off pixels, by a vision-language model; another one than that of `--llm`.
+
+    Args:
+        parts: the domain.
+        endpoint: which, and how it is asked.
+        shown: how things are shown to it.
+        record: a file that all answers are written to.
+        file: answers that `record` wrote: nobody is asked.
+    """
+    model: LanguageModel
+    model = (
+        openai(endpoint=endpoint or EyesConfig(), record=record)
+        if file is None
+        else replay(file=file)
+    )
+    return ModelStateEstimator(model, parts.domain, shown)
 
 
 def _pictures(parts: Parts) -> Callable[[Reference], Rgb | None] | None:

@@ -93,8 +93,11 @@ TABLES: Mapping[str, Table] = {
             kinds.STATES,
             "learned",
             {
-                name: f"{_SEEING}:{name}"
-                for name in ("clip", "given", "learned", "oracle", "siglip")
+                **{
+                    name: f"{_SEEING}:{name}"
+                    for name in ("clip", "given", "learned", "oracle", "siglip")
+                },
+                "model": f"{_LANGUAGE}:model_states",
             },
         ),
         Table(
@@ -204,9 +207,12 @@ NEEDS: Mapping[tuple[str, str], str] = {
     **{(kinds.SENSOR.name, n): "perception" for n in ("kinect", "realistic", "realsense", "tof")},
     (kinds.STATES.name, "clip"): "vision",
     (kinds.STATES.name, "learned"): "perception",
+    (kinds.STATES.name, "model"): "llm",
+    (kinds.STATES.name, "siglip"): "vision",
     (kinds.TEXT_ENCODER.name, "sentence"): "text",
     (kinds.TEXT_ENCODER.name, "two-tower"): "perception",
     (kinds.IMAGE_ENCODER.name, "clip"): "vision",
+    (kinds.IMAGE_ENCODER.name, "siglip"): "vision",
     (kinds.IMAGE_ENCODER.name, "two-tower"): "perception",
     (kinds.CAPTIONER.name, "blip"): "vision",
     (kinds.LLM.name, "openai"): "llm",

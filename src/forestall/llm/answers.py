@@ -8,48 +8,25 @@ are to be thought of, since endpoints have them written in that order.
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 from forestall.domain.checks import check_literal
 from forestall.domain.model import Domain
 from forestall.domain.truth import truth
 from forestall.errors import ForestallError
+from forestall.llm.forms import Unfit, list_of, object_of, read_answer, text_of
 from forestall.llm.words import changeable
-from forestall.reading.documents import parse_json
 from forestall.reading.fields import Field
 from forestall.types.facts import Literal, Truth
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
-
-T = TypeVar("T")
 
 MOST_FACTS, MOST_STEPS = 12, 60
 _LONGEST = 400
 
 Said = dict[int, tuple[tuple[Literal, ...], str]]
 """Number of a step → facts that should hold before it, over its skill's parameters; and why."""
-
-_FENCE = re.compile(r"^\s*```(?:json)?\s*\n(.*?)\n?\s*```\s*$", re.DOTALL)
-
-
-def _object(**properties: Any) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "properties": properties,
-        "required": list(properties),
-        "additionalProperties": False,
-    }
-
-
-def _list(items: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items}
-
-
-def _text(description: str) -> dict[str, Any]:
-    return {"type": "string", "description": description}
 
 
 def diagnosis_schema(things: Collection[str], steps: Collection[int] = ()) -> str:
@@ -60,21 +37,21 @@ def diagnosis_schema(things: Collection[str], steps: Collection[int] = ()) -> st
     among = {"type": "string", "enum": sorted(things)} if things else {"type": "string"}
     step = {"step": {"type": "integer", "enum": sorted(steps)}} if steps else {}
     return json.dumps(
-        _object(
+        object_of(
             **step,
-            cause=_text("what is wrong, one sentence"),
-            why=_text("how that makes the step fail, one sentence"),
-            because_of=_list(among),
-            must_change=_list(_text("a fact that must become true")),
-            must_stay=_list(_text("a fact that must stay true")),
-            advice=_text("what to do, one sentence"),
+            cause=text_of("what is wrong, one sentence"),
+            why=text_of("how that makes the step fail, one sentence"),
+            because_of=list_of(among),
+            must_change=list_of(text_of("a fact that must become true")),
+            must_stay=list_of(text_of("a fact that must stay true")),
+            advice=text_of("what to do, one sentence"),
         ),
     )
 
 
 def verified_schema() -> str:
     """The schema of whether a step did what it is for."""
-    return json.dumps(_object(why=_text("one sentence"), done={"type": "boolean"}))
+    return json.dumps(object_of(why=text_of("one sentence"), done={"type": "boolean"}))
 
 
 def verified(answer: str) -> tuple[bool, str]:
@@ -83,31 +60,31 @@ def verified(answer: str) -> tuple[bool, str]:
     Raises:
         Unfit: the answer cannot be read.
     """
-    return _read(answer, lambda field: (field["done"].flag(), line(field["why"].text())))
+    return read_answer(answer, lambda field: (field["done"].flag(), line(field["why"].text())))
 
 
 def plan_schema(skills: Collection[str], things: Collection[str]) -> str:
     """The schema of a plan: its skills and things are the ones at hand."""
-    step = _object(
+    step = object_of(
         skill={"type": "string", "enum": sorted(skills)},
-        args=_list({"type": "string", "enum": sorted(things)}),
+        args=list_of({"type": "string", "enum": sorted(things)}),
     )
-    return json.dumps(_object(idea=_text("one sentence"), steps=_list(step)))
+    return json.dumps(object_of(idea=text_of("one sentence"), steps=list_of(step)))
 
 
 def expectations_schema(numbers: Collection[int]) -> str:
     """The schema of what should hold before some steps of a plan, by their numbers."""
-    step = _object(
+    step = object_of(
         step={"type": "integer", "enum": sorted(numbers)},
-        must_hold=_list(_text("a fact")),
-        why=_text("one sentence"),
+        must_hold=list_of(text_of("a fact")),
+        why=text_of("one sentence"),
     )
-    return json.dumps(_object(steps=_list(step)))
+    return json.dumps(object_of(steps=list_of(step)))
 
 
 def explanation_schema() -> str:
     """The schema of one sentence for people."""
-    return json.dumps(_object(explanation=_text("one sentence")))
+    return json.dumps(object_of(explanation=text_of("one sentence")))
 
 
 def sentence_of(answer: str) -> str:
@@ -116,7 +93,7 @@ def sentence_of(answer: str) -> str:
     Raises:
         Unfit: there is none.
     """
-    text = _read(answer, lambda field: line(field["explanation"].text()))
+    text = read_answer(answer, lambda field: line(field["explanation"].text()))
     if not text:
         raise Unfit("the explanation is empty")
     return text
@@ -135,32 +112,13 @@ class Explained:
     dropped: tuple[str, ...]
 
 
-class Unfit(ForestallError):
-    """An answer that cannot be taken; the text is what the model is told."""
-
-
-def _read(answer: str, read: Callable[[Field], T]) -> T:
-    """What a text in JSON says.
-
-    Raises:
-        Unfit: it is no JSON, or not what was asked for; says what and where.
-    """
-    fenced = _FENCE.match(answer)
-    try:
-        return read(Field(parse_json(answer if fenced is None else fenced[1])))
-    except Unfit:
-        raise
-    except ForestallError as error:
-        raise Unfit(f"the answer cannot be read: {error}") from error
-
-
 def explanation(answer: str, graph: SceneGraph, domain: Domain) -> Explained:
     """Read an explanation; facts that the domain or the scene does not know are dropped.
 
     Raises:
         Unfit: it is none, or says nothing.
     """
-    return _read(answer, lambda field: _explained(field, graph, domain))
+    return read_answer(answer, lambda field: _explained(field, graph, domain))
 
 
 def located(
@@ -178,7 +136,7 @@ def located(
             raise Unfit(f"there is no step {number}: the run has {len(numbers)}")
         return number, _explained(field, graph, domain)
 
-    return _read(answer, read)
+    return read_answer(answer, read)
 
 
 def _explained(field: Field, graph: SceneGraph, domain: Domain) -> Explained:
@@ -269,7 +227,7 @@ def expectations(
             found[number] = (tuple(facts.values()), why)
         return found
 
-    return _read(answer, read), tuple(dropped)
+    return read_answer(answer, read), tuple(dropped)
 
 
 def expected_fact(text: str, step: Subtask, domain: Domain) -> Literal:
@@ -319,7 +277,7 @@ def steps(
             _check(number, step, skills, things, domain)
         return found
 
-    return _read(answer, read)
+    return read_answer(answer, read)
 
 
 def _step(field: Field) -> Subtask:

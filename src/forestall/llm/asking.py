@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from forestall.deadline import Deadline
-from forestall.llm.answers import Unfit
+from forestall.llm.forms import Unfit
 from forestall.llm.prompts import fragment
 from forestall.seams.language import LanguageModel
 from forestall.types.exchange import Exchange, Request

@@ -13,7 +13,8 @@ from typing import Protocol
 
 from forestall.deadline import Deadline
 from forestall.llm import words
-from forestall.llm.answers import Unfit, explanation_schema, sentence_of
+from forestall.llm.answers import explanation_schema, sentence_of
+from forestall.llm.forms import Unfit
 from forestall.llm.prompts import rendered
 from forestall.seams.language import LanguageModel
 from forestall.types.exchange import Exchange, Request

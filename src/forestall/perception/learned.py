@@ -110,10 +110,7 @@ class LearnedStateEstimator:
             best = int(confidence.argmax())
             sure = confidence[best] >= self._encoder.reading.least_confidence(question.attribute)
             found[question.attribute] = question.values[best] if sure else None
-        for attribute, value in found.items():
-            if value is not None and self._domain.attributes[attribute].obscures == value:
-                return {a: value if a == attribute else None for a in found}
-        return found
+        return unobscured(found, self._domain)
 
     def _vectors(self, category: str, attribute: str) -> npt.NDArray[np.float32]:
         rows = []
@@ -127,3 +124,11 @@ class LearnedStateEstimator:
                 ) from error
             rows.append(mean / np.linalg.norm(mean))
         return np.stack(rows)
+
+
+def unobscured(states: Mapping[str, str | None], domain: Domain) -> Mapping[str, str | None]:
+    """States without those that another one keeps a camera from telling (of what is broken)."""
+    for attribute, value in states.items():
+        if value is not None and domain.attributes[attribute].obscures == value:
+            return {a: value if a == attribute else None for a in states}
+    return states

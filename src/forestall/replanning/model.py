@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, replace
 from forestall.deadline import Deadline
 from forestall.domain.model import Domain
 from forestall.llm import words
-from forestall.llm.answers import Unfit, plan_schema, steps
+from forestall.llm.answers import plan_schema, steps
 from forestall.llm.asking import answered
+from forestall.llm.forms import Unfit
 from forestall.llm.prompts import rendered
 from forestall.planning.execute import products
 from forestall.planning.refused import is_refused, unexplained
