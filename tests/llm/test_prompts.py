@@ -46,7 +46,8 @@ VALUES: dict[str, dict[str, Any]] = {
     },
     "replanning": {
         "goal": "g", "cause": "c", "advice": "", "change": [], "stay": [], "never": [],
-        "refused": [], "rest": "nothing", "holding": "nothing", "at": "A", "observed": [],
+        "refused": [], "vain": [], "rest": "nothing", "holding": "nothing", "at": "A",
+        "observed": [],
         "places": [], "skills": ["put(thing)"],
     },
 }  # fmt: skip

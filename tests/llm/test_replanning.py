@@ -139,6 +139,17 @@ def test_what_the_robot_has_refused_is_not_planned_again() -> None:
     assert found.outcome is ReplanOutcome.REJECTED and "has refused pick_up" in found.note
 
 
+def test_what_was_tried_in_vain_is_told_as_that_and_not_as_refused() -> None:
+    step = Subtask.parse("pick_up(Bowl-1)")
+    context = replace(occupied(), refused=(step,), vain=(step,))
+    model = Scripted([planned(*REPAIR)])
+    found = ModelReplanner(model, VALIDATOR, DOMAIN, attempts=1).replan(context, VACANT)
+    assert found.outcome is ReplanOutcome.REJECTED
+    assert "pick_up(Bowl-1) was tried time and again" in found.note and "refused" not in found.note
+    text = model.asked[0].messages[1][1]
+    assert "came to nothing: pick_up(Bowl-1)" in text and "has refused" not in text
+
+
 def test_without_a_goal_a_plan_must_end_with_what_was_left() -> None:
     context = occupied()
     context = replace(context, task=replace(context.task, goal=Goal("heat it")))

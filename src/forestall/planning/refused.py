@@ -1,4 +1,4 @@
-"""Steps that the robot has refused: what is not tried again.
+"""Steps that the robot has refused, or that came to nothing time and again: not tried once more.
 
 Called by `planner` and `replanning`; calls `execute` and `driving`.
 """
@@ -21,6 +21,18 @@ def is_refused(steps: Iterable[Subtask], refused: Collection[Subtask]) -> Subtas
     return next((s for s in steps if any(same_step(s, one) for one in refused)), None)
 
 
+def denial(step: Subtask, vain: Collection[Subtask]) -> str:
+    """Why a step is not tried again.
+
+    Args:
+        step: that was refused.
+        vain: of those that are refused, what the robot does not refuse and has tried in vain.
+    """
+    if is_refused((step,), vain):
+        return f"{step} was tried time and again and came to nothing"
+    return f"the robot has refused {step}, and nothing about it has changed"
+
+
 def unexplained(state: State, refused: Iterable[Subtask]) -> frozenset[Subtask]:
     """Refused steps of which a state does not say why.
 
@@ -37,13 +49,14 @@ def unexplained(state: State, refused: Iterable[Subtask]) -> frozenset[Subtask]:
     return frozenset(found)
 
 
-def no_other(state: State, refused: Iterable[Subtask]) -> Iterator[str]:
+def no_other(state: State, refused: Iterable[Subtask], vain: Collection[Subtask]) -> Iterator[str]:
     """For each refused step a sentence that names the things of which there is only the one."""
     for step in sorted(refused):
         kinds = [state.kinds[a] for a in step.args if a in state.kinds]
         alone = list(dict.fromkeys(k for k in kinds if len(state.instances(k)) == 1))
         other = f"there is no other {' and no other '.join(alone)}" if alone else "no other will do"
-        yield f"{step} was refused, and {other}"
+        how = "came to nothing" if is_refused((step,), vain) else "was refused"
+        yield f"{step} {how}, and {other}"
 
 
 def barred_by(state: State, refused: frozenset[Subtask]) -> Callable[[Draft], bool] | None:

@@ -11,7 +11,7 @@ import time
 from forestall.deadline import Deadline
 from forestall.domain.model import Domain
 from forestall.planning.planner import plan_goal
-from forestall.planning.refused import is_refused, no_other, unexplained
+from forestall.planning.refused import denial, is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.validate import as_checked, observed
 from forestall.seams.judging import PlanValidator
@@ -59,13 +59,13 @@ class GoalReplanner:
             check = self.validator.check(plan, context.graph, goal)
             denied = is_refused(check.plan or plan, refused)
             if denied is not None:
-                outcome, note = ReplanOutcome.REJECTED, f"the robot has refused {denied}"
+                outcome, note = ReplanOutcome.REJECTED, denial(denied, context.vain)
             elif check.ok:
                 plan = as_checked(plan, check, state)
             else:
                 outcome, note = ReplanOutcome.REJECTED, check.reason
         if outcome is not ReplanOutcome.SOLVED:
-            note = "; ".join((*no_other(state, refused), note))
+            note = "; ".join((*no_other(state, refused, context.vain), note))
         return Replan(
             outcome,
             plan,

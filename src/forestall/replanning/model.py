@@ -19,7 +19,7 @@ from forestall.llm.asking import answered
 from forestall.llm.forms import Unfit
 from forestall.llm.prompts import rendered
 from forestall.planning.execute import products
-from forestall.planning.refused import is_refused, unexplained
+from forestall.planning.refused import denial, is_refused, unexplained
 from forestall.planning.state import State
 from forestall.planning.validate import as_checked, observed, run, unsupported
 from forestall.seams.judging import PlanValidator, Replanner
@@ -111,7 +111,8 @@ class ModelReplanner:
             change=[words.fact(x) for x in diagnosis.must_change],
             stay=[words.fact(x) for x in _worth_telling(diagnosis, domain)],
             never=[words.fact(_plain(x)) for x in context.task.goal.never],
-            refused=[words.step(s) for s in context.refused],
+            refused=[words.step(s) for s in context.refused if s not in context.vain],
+            vain=[words.step(s) for s in context.refused if s in context.vain],
             rest="; ".join(map(words.step, context.remaining())) or _done(context),
             holding=", ".join(words.name(h) for _, h in state.in_hands()) or "nothing",
             at=words.name(_stands(context, domain) or "an unknown place"),
@@ -175,7 +176,7 @@ class ModelReplanner:
             refused = unexplained(state, context.refused)
             denied = is_refused((check.plan or plan).subtasks, refused)
             if denied is not None:
-                reason = f"the robot has refused {denied}, and nothing about it has changed"
+                reason = denial(denied, context.vain)
         if not reason:
             reason = _ends_otherwise(plan, context) or _not_brought_about(plan, diagnosis, state)
         if reason:

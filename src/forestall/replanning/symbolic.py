@@ -16,7 +16,7 @@ from forestall.domain.looked import searched
 from forestall.domain.model import Domain
 from forestall.planning.goals import alternatives
 from forestall.planning.planner import Planned, plan_goal, plan_to
-from forestall.planning.refused import is_refused, no_other, unexplained
+from forestall.planning.refused import denial, is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
 from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
@@ -45,6 +45,7 @@ class _Attempts:
     start_s: float
     deadline: Deadline
     refused: frozenset[Subtask] = frozenset()
+    vain: tuple[Subtask, ...] = ()
     expanded: int = 0
     timed_out: bool = False
     unproven: bool = False
@@ -117,7 +118,7 @@ class PlannerReplanner:
             names = ", ".join(map(str, diagnosis.must_change))
             return self._ended(attempts, ReplanOutcome.UNSUPPORTED, f"no skill is about {names}")
         state = observed(context.graph, self.domain)
-        attempts.refused = unexplained(state, context.refused)
+        attempts.refused, attempts.vain = unexplained(state, context.refused), context.vain
         repairs: list[Planned] = []
         stay = [x for x in diagnosis.must_stay if not set(lost) & set(x.args)]
         for repair in self._repairs(attempts, state, context, wanted, stay):
@@ -161,7 +162,7 @@ class PlannerReplanner:
         found, and is then.
         """
         state = observed(context.graph, self.domain)
-        attempts.refused = unexplained(state, context.refused)
+        attempts.refused, attempts.vain = unexplained(state, context.refused), context.vain
         for name in lost:
             empty = searched(name, known, self.domain)
             places = hiding_places(
@@ -293,8 +294,7 @@ class PlannerReplanner:
         check = self.validator.check(plan, context.graph, goal or context.task.goal)
         denied = is_refused(check.plan or plan, attempts.refused)
         if denied is not None:
-            reason = f"the robot has refused {denied}, and nothing about it has changed"
-            check = replace(check, ok=False, reason=reason)
+            check = replace(check, ok=False, reason=denial(denied, attempts.vain))
         if not check.ok:
             attempts.rejected = attempts.rejected or (plan, check)
             return None
@@ -334,7 +334,9 @@ class PlannerReplanner:
             vain = [n for n in attempts.notes if n.endswith(IN_VAIN)]
             note = f"{', '.join(dict.fromkeys(lost))}: its place is not known"
             return self._ended(attempts, ReplanOutcome.UNSOLVABLE, "; ".join((*vain, note)))
-        note = "; ".join(dict.fromkeys((*no_other(state, attempts.refused), *attempts.notes)))
+        note = "; ".join(
+            dict.fromkeys((*no_other(state, attempts.refused, attempts.vain), *attempts.notes))
+        )
         if attempts.timed_out:
             return self._ended(attempts, ReplanOutcome.TIMEOUT, note)
         if attempts.rejected is not None and not attempts.notes:
