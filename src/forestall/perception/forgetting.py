@@ -12,6 +12,7 @@ import numpy as np
 
 from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
+from forestall.perception.geometry import filled
 from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import Track
 from forestall.types.graph import Seen
@@ -49,11 +50,35 @@ def merge_renamed(
         shares = {n: _shared(tracks[old], tracks[n]) for n in alike}
         new = max(alike, key=lambda n: shares[n], default=None)
         if new is not None and shares[new] >= config.same_share:
-            known = {a: v for a, v in tracks[old].states.items() if v is not None}
-            tracks[new].states = {**known, **tracks[new].states}
-            tracks[new].interior_seen |= tracks[old].interior_seen
-            tracks[new].shown = np.union1d(tracks[new].shown, tracks[old].shown)
+            _inherit(tracks[new], tracks[old])
             remove(tracks, old, new)
+
+
+def join(tracks: Tracks, part: str, whole: str) -> None:
+    """Two things are one: what is known of the larger stays, under the name of the whole."""
+    if part not in tracks:
+        return
+    one, other = tracks[part], tracks.get(whole)
+    remove(tracks, part, whole)
+    if other is None or _size(one) > _size(other):
+        if other is not None:
+            _inherit(one, other)
+            one.parent, one.first_seen_s = other.parent, other.first_seen_s
+        one.id, tracks[whole] = whole, one
+    else:
+        _inherit(other, one)
+
+
+def _inherit(track: Track, old: Track) -> None:
+    """What was known of a thing under another name."""
+    known = {a: v for a, v in old.states.items() if v is not None}
+    track.states = {**known, **track.states}
+    track.interior_seen |= old.interior_seen
+    track.shown = np.union1d(track.shown, old.shown)
+
+
+def _size(track: Track) -> int:
+    return 0 if track.points_world_m is None else len(track.points_world_m)
 
 
 def give_way(
@@ -120,7 +145,4 @@ def _shared(one: Track, other: Track) -> float:
     """The volume that two boxes share, as a share of the smaller one's."""
     if one.points_world_m is None or other.points_world_m is None:
         return 0.0
-    low, high = np.maximum(one.low_m, other.low_m), np.minimum(one.high_m, other.high_m)
-    both = float(np.prod(np.maximum(high - low, 0.0)))
-    volumes = [float(np.prod(np.maximum(t.high_m - t.low_m, 1e-4))) for t in (one, other)]
-    return both / min(volumes)
+    return filled(np.stack([one.low_m, one.high_m]), np.stack([other.low_m, other.high_m]))

@@ -96,3 +96,13 @@ def sampled(points_m: Points, most: int = _SAMPLES) -> Points:
         return points_m
     picked: Points = points_m[np.linspace(0, len(points_m) - 1, most).astype(np.int64)]
     return picked
+
+
+def filled(one_m: Points, other_m: Points) -> float:
+    """The volume that two boxes share, as a share of the smaller one's.
+
+    Boxes are (2, 3): the low and the high corner.
+    """
+    low, high = np.maximum(one_m[0], other_m[0]), np.minimum(one_m[1], other_m[1])
+    both = float(np.prod(np.maximum(high - low, 0.0)))
+    return both / min(float(np.prod(np.maximum(np.ptp(b, axis=0), 1e-4))) for b in (one_m, other_m))

@@ -4,7 +4,9 @@ A detection takes the name of what is known where it is (assignment by least tot
 which size and look decide between things side by side), or a new number. Nothing moves by itself:
 what is known is where its box was, as far as a pose may be wrong; where a thing was moved,
 `own_names.py` finds it again. Of furniture a view shows a part, and the part lies on what is known
-of it. What is in the hand goes round with the robot between two views. Called by the perceiver.
+of it, or, where it can be opened, in its place: open it shows other sides, and two of a kind do not
+fill one place. What is in the hand goes round with the robot between two views. Called by the
+perceiver.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from forestall.perception.config import PerceptionConfig
+from forestall.perception.geometry import filled
 from forestall.perception.unproject import Cloud, Labels, Points
 from forestall.types.facts import category_of
 from forestall.types.observation import Detection, Rgb
@@ -24,6 +27,7 @@ Cells = npt.NDArray[np.int64]
 
 _NEVER = 1e6
 _CELL_M = 0.03
+_MARGIN_M = np.array([[-0.5], [0.5]]) * _CELL_M  # around a box, so that a flat one has a volume
 _SAMPLES = 300
 _EDGE_SHARE = 0.02  # what two sides of one piece share: the edge between them
 _FLAT = 0.2  # thickness of a side, as a share of its middle extent
@@ -46,6 +50,7 @@ class Known:
             for other things.
         box_m: (2, 3) lower and upper corner of what is known; None for what was just let go.
         look: (3,) mean colour from 0 to 1, None where it is not known.
+        hollow: whether it can be opened: then it looks another way, at the same place.
         only: whether there is no other of its category: the ground.
         turning: whether it is in the hand, or on what is: it stands at another side of the robot
             in every view, as far from its axis and as high.
@@ -57,6 +62,7 @@ class Known:
     turning: bool = False
     only: bool = False
     look: Points | None = None
+    hollow: bool = False
 
     @classmethod
     def of(
@@ -171,12 +177,16 @@ def _cost(
     if known.only:
         return 0.0
     if known.cells is not None:
-        if not known.touches(np.stack([cloud.low_m, cloud.high_m])):
+        box_m = np.stack([cloud.low_m, cloud.high_m])
+        if known.box_m is None or not known.touches(box_m):
             return _NEVER
         share = _shared(cloud.points_world_m, known.cells)
         if share >= config.same_surface_share:
             return 1.0 - share
-        return 1.0 - share / 2 if share >= _EDGE_SHARE and _is_side(cloud, known) else _NEVER
+        if share >= _EDGE_SHARE and _is_side(cloud, known):
+            return 1.0 - share / 2
+        within = filled(box_m + _MARGIN_M, known.box_m + _MARGIN_M) if known.hollow else 0.0
+        return 1.0 - within / 2 if within >= config.same_share else _NEVER
     if known.turning:
         here, there = (_around(p, axis_m) for p in (cloud.centroid_m, known.centroid_m))
         away = float(np.linalg.norm(here - there))

@@ -18,7 +18,7 @@ from forestall.perception.naming import Known, of_one_piece, unlike, unused
 from forestall.perception.surfaces import fixed
 from forestall.perception.tracks import Track, View, middle, riding
 from forestall.perception.unproject import Points
-from forestall.types.facts import category_of, is_instance
+from forestall.types.facts import by_number, category_of, is_instance
 from forestall.types.graph import Relation
 from forestall.types.observation import GripperState, Observation, Vec3
 
@@ -80,8 +80,13 @@ def known(
     """
     if category not in kinds:
         return Known(centroid_m)
-    ground = domain.is_a(category, domain.roles.ground)
-    return replace(Known.of(points_m, centroid_m, fixed(domain, category), look), only=ground)
+    found = Known.of(points_m, centroid_m, fixed(domain, category), look)
+    ground, encloses = domain.roles.ground, domain.roles.encloses
+    return replace(
+        found,
+        only=ground is not None and domain.is_a(category, ground),
+        hollow=encloses is not None and domain.is_a(category, encloses),
+    )
 
 
 def expected(
@@ -117,9 +122,9 @@ def expected(
 def join_parts(
     view: View, places: dict[str, Known], tracks: Tracks, apart: Sequence[Collection[str]]
 ) -> dict[str, str]:
-    """Names that turn out to be those of a part → the name of the piece of furniture.
+    """Names of furniture that turns out to be a part of other furniture → the name of both.
 
-    Of two names the one that was known before stays.
+    Of two names the one that was known first stays: it is the one that plans speak of.
 
     Args:
         view: shows both.
@@ -131,12 +136,17 @@ def join_parts(
     for one, other in of_one_piece(view.ids, view.clouds, places).items():
         if other not in view.guessed or any(one in ids and other in ids for ids in apart):
             continue
-        later = one in tracks and other not in tracks
-        part, whole = (other, one) if later else (one, other)
+        whole, part = sorted((one, other), key=lambda n: _since(n, tracks))
         if part in places and whole in places:
             parts[part] = whole
             places[whole] = places[whole].joined(places.pop(part))
     return parts
+
+
+def _since(name: str, tracks: Tracks) -> tuple[float, str, int]:
+    """Since when a name is known: what has none yet is the newest."""
+    track = tracks.get(name)
+    return (float("inf") if track is None else track.first_seen_s, *by_number(name))
 
 
 def settled(

@@ -15,7 +15,7 @@ from forestall.errors import InputError, PerceptionError
 from forestall.extras import need
 from forestall.perception.config import PerceptionConfig, ScopeConfig
 from forestall.perception.foreground import own_pixels
-from forestall.perception.forgetting import remove
+from forestall.perception.forgetting import join
 from forestall.perception.fuse import SceneMemory
 from forestall.perception.gate import Masks, inspect
 from forestall.perception.gate_config import GateConfig, WatchConfig
@@ -212,8 +212,7 @@ class GraphPerceiver:
                 apart = [set(v.ids) for v in views]
                 parts |= join_parts(view, places, tracks, apart)
         for part, whole in parts.items():
-            if part in tracks:
-                remove(tracks, part, whole)
+            join(tracks, part, whole)
         views = [replace(v, ids=tuple(_whole(n, parts) for n in v.ids)) for v in views]
         return called_right(views, tracks, observation.hands, axis_m, domain)
 
