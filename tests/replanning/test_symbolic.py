@@ -417,3 +417,19 @@ def test_a_burner_is_off_during_a_long_detour_and_on_again_for_the_rest() -> Non
     assert texts.index("toggle_off(StoveBurner-1)") < texts.index("pick_up(Pan-1)")
     assert texts.index("toggle_on(StoveBurner-1)") > texts.index("put_in(Pan-1, Sink-1)")
     assert texts.index("toggle_on(StoveBurner-1)") < texts.index("crack_obj(Egg-1)")
+
+
+def test_a_burner_that_nothing_needs_stays_off_after_the_detour() -> None:
+    """Somebody has left it on; what was turned off for safety is on again only where that helps."""
+    case = Repair(
+        "make-coffee",
+        "put_in(Mug, CoffeeMachine)",
+        "Mug-1 is dirty, Mug-1 held, StoveBurner-2 is on",
+        ("dirty(Mug-1)=clean",),
+        "",
+    )
+    answer, _ = attempt(case)
+    assert answer.plan is not None
+    texts = answer.plan.texts()
+    assert texts.index("toggle_off(StoveBurner-2)") < texts.index("toggle_on(Faucet-1)")
+    assert "toggle_on(StoveBurner-2)" not in texts

@@ -88,7 +88,11 @@ def cheaper(asked: Asked, found: Replan, rest: int) -> Replan:
 
 
 def _ended_first(asked: Asked, steps: Steps, mine: int) -> list[tuple[Steps, int]]:
-    """Plans that first end what is dangerous now, and bring it about again where it is needed."""
+    """Plans that first end what is dangerous now, and bring it about again where it is needed.
+
+    Where there is a goal, who checks the plan says whether it is; what somebody has left on and
+    nothing asks for stays off.
+    """
     state = asked.state
     detour_s = robot_time_s(run(state, steps[:mine]), asked.start)
     if not unsafe(state) or detour_s < DETOUR_S:
@@ -111,13 +115,22 @@ def _ended_first(asked: Asked, steps: Steps, mine: int) -> list[tuple[Steps, int
         for k in range(last + 1)
         if back and (k in (0, last) or _drives(state, rest[k]))
     ]
+    ended = frozenset() if asked.keeps_rest else frozenset((*x.args, x.predicate) for x in usual)
     traces = [(plan, run(state, plan)) for plan in plans]
     fitting = [
         (cost_s(trace, asked.start), plan)
         for plan, trace in traces
-        if trace.refusal is None and content(trace.final) == content(end)
+        if trace.refusal is None and _ends_as_well(trace.final, end, ended)
     ]
     return [(plan, own) for _, plan in sorted(fitting)[:MOST_TRIED]]
+
+
+def _ends_as_well(state: State, end: State, ended: frozenset[tuple[str, ...]]) -> bool:
+    """Whether everything is as it would be in the end, or what was dangerous has been ended."""
+    different = content(state) ^ content(end)
+    if not different:
+        return True
+    return unsafe(state) < unsafe(end) and all(x[:-1] in ended for x in different)
 
 
 def _drives(state: State, step: Subtask) -> bool:
