@@ -4,7 +4,7 @@ import pytest
 
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.state import State
-from forestall.planning.validate import GraphValidator, observed, run
+from forestall.planning.validate import GraphValidator, observed, run, unmet
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan, Subtask
@@ -81,6 +81,18 @@ def test_goal_variables_bind_to_any_instance() -> None:
     graph = scene(home_of("make-coffee"), "Mug-2 on CounterTop-1")
     steps = [t.replace("Mug", "Mug-2") for t in PLANS["make-coffee"].texts()]
     assert CHECK(Plan.parse(steps), graph, GOALS["make-coffee"]).ok
+
+
+def test_of_two_that_would_do_the_one_that_the_plan_deals_with_is_missed() -> None:
+    two = "Toaster-1, BreadSliced-1 on CounterTop-1, BreadSliced-2 in Toaster-1"
+    toasted = goal("cooked(?slice)=cooked", slice="BreadSliced")
+    turned = CHECK(plan("toggle_on(Toaster-1)\n toggle_off(Toaster-1)"), scene(two), toasted)
+    assert turned.ok
+    left = CHECK(plan("pick_up(BreadSliced-2)"), scene(two), toasted)
+    assert left.unmet == (Literal.parse("cooked(BreadSliced-2)=cooked"),)
+    state = observed(scene(two), DOMAIN)
+    assert unmet((state,), toasted, {"Toaster-1"}) == left.unmet
+    assert unmet((state,), toasted, {"CounterTop-1"})[0].args == ("BreadSliced-1",)
 
 
 def test_running_water_cleans_and_fills_what_is_empty_and_leaves_wine() -> None:

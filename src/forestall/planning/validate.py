@@ -6,7 +6,7 @@ and why, and then the goal facts that the plan leaves unmet.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
@@ -55,7 +55,7 @@ class GraphValidator:
         if trace.refusal is not None:
             reason, lacking = trace.refusal.reason, trace.refusal.lacking
             return PlanCheck(False, trace.step, reason, lacking, (), assumed, meant)
-        missing = unmet(trace.states, goal)
+        missing = unmet(trace.states, goal, trace.touched)
         reason = ""
         if missing:
             reason = "the plan runs, but its goal is not met: " + ", ".join(map(str, missing))
@@ -103,12 +103,15 @@ def run(state: State, subtasks: Iterable[Subtask]) -> Trace:
     return Trace(tuple(states), None, None, frozenset(touched), tuple(meant))
 
 
-def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
+def unmet(
+    states: tuple[State, ...], goal: Goal, handled: Collection[str] = ()
+) -> tuple[Literal, ...]:
     """Goal literals that fail under the best binding of the goal's variables; () if it is met.
 
-    A literal of `never` that held at any time is returned as it stands, bound. Where there are
-    more bindings than are gone through, a goal may be called unmet that is met, and never the
-    other way round.
+    Of bindings under which as few fail, the one of things that a plan deals with is the best:
+    those in `handled`, or in what it handles. A literal of `never` that held at any time is
+    returned as it stands, bound. Where there are more bindings than are gone through, a goal may
+    be called unmet that is met, and never the other way round.
     """
     final = states[-1]
     known: dict[Literal, bool] = {}
@@ -124,19 +127,36 @@ def unmet(states: tuple[State, ...], goal: Goal) -> tuple[Literal, ...]:
             once[literal] = any(s.holds(literal) for s in states)
         return once[literal]
 
+    def dealt_with(binding: Mapping[str, str]) -> int:
+        return sum(_dealt_with(states[0], thing, handled) for thing in binding.values())
+
     best: tuple[Literal, ...] | None = None
+    fewest = (0, 0)
     for binding in bindings(final, goal, fails, happened):
         missing = tuple(g for x in goal.literals if fails(g := x.bind(binding)))
         never = tuple(g for x in goal.never if happened(g := x.bind(binding)))
         if not missing and not never:
             return ()
-        if best is None or len(missing) + len(never) < len(best):
-            best = missing + never
+        if best is None or len(missing) + len(never) <= len(best):
+            rank = (len(missing) + len(never), -dealt_with(binding))
+            if best is None or rank < fewest:
+                best, fewest = missing + never, rank
     if best is not None:
         return best
     lacking = dict.fromkeys(c for _, c in goal.variables if not final.matches(c))
     lacking = lacking or dict.fromkeys(c for _, c in goal.variables)  # fewer than are asked for
     return tuple(Literal(LOCATED, (c,)) for c in lacking)
+
+
+def _dealt_with(state: State, thing: str, handled: Collection[str]) -> bool:
+    """Whether a plan that handles some things deals with one: with it, or with what it is in.
+
+    Places of which any will do say nothing.
+    """
+    if thing in handled:
+        return True
+    places = [p.parent for p in state.chain(thing)]
+    return any(p in handled and not state.domain.is_open_support(p) for p in places)
 
 
 def bindings(
