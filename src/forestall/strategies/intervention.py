@@ -219,6 +219,8 @@ class Intervention:
             why = f"what {context.subtask} is to bring about holds already"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
         replan = self._another_way(context, self._with_places(diagnosis))
+        if replan.outcome is not ReplanOutcome.SOLVED:
+            replan = self._found_first(context, diagnosis, replan)
         clock.lap("replan")
         if _is_the_old(replan.plan, context):  # what must change is nothing that planning knows of
             return self._no_plan(context, verdict, diagnosis, replan, clock)
@@ -245,6 +247,21 @@ class Intervention:
             if found.outcome is ReplanOutcome.SOLVED and not _is_the_old(found.plan, context):
                 return found
         return self._replanner.replan(context, diagnosis)
+
+    def _found_first(
+        self, context: BoundaryContext, diagnosis: Diagnosis, failed: Replan
+    ) -> Replan:
+        """Where a repair fails since nobody knows where a thing is: a plan to look for that first.
+
+        What must change is mended when the thing is found. The failed repair where that is not why.
+        """
+        lost = () if failed.check is None else failed.check.lacking
+        lost = tuple(x for x in lost if x.predicate == LOCATED)
+        if not lost or set(lost) <= set(diagnosis.must_change):
+            return failed
+        wanted = self._with_places(replace(diagnosis, must_change=lost))
+        search = self._another_way(context, wanted)
+        return search if search.looking_for else failed
 
     def _with_places(self, diagnosis: Diagnosis) -> Diagnosis:
         """A diagnosis with where the things that nobody sees are not: where one has looked."""
