@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
+from itertools import product
 
 from forestall.domain.load import shipped
 from forestall.perception.given import GivenStateEstimator
 from forestall.perception.perceiver import GraphPerceiver
 from forestall.perception.segmenters import InstanceSegmenter
+from forestall.planning.altered import altered
 from forestall.types.facts import Change
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.plan import Subtask
@@ -59,3 +62,30 @@ def test_without_a_model_of_what_skills_change_what_was_read_stands() -> None:
     eyes.acted(STEP, succeeded=True)
     node = eyes.perceive(observed(SCENE, NEAR, time_s=1.0)).get("Mug-1")
     assert node is not None and dict(node.states)["filled"] == "empty"
+
+
+def test_what_was_cut_and_is_out_of_sight_is_nowhere_until_it_is_seen() -> None:
+    """A bowl stands before the slices, or before what the knife has only glanced off."""
+    domain = shipped("household")
+    lettuce = at("Lettuce-1", 0.1, 0.4, 0.9, (0.14, 0.14, 0.12), True)
+    knife = at("Knife-1", 0.3, -0.3, 1.0, (0.02, 0.2, 0.02), True)
+    wall = Solid("Pot-1", (-0.2, 0.1, 0.9), (0.4, 0.14, 1.3), True)
+    cut = Subtask.parse("slice_obj(Lettuce-1)")
+    for succeeded, shown in product((True, False), (True, False)):
+        eyes = GraphPerceiver(
+            InstanceSegmenter(),
+            GivenStateEstimator({}),
+            domain,
+            gate=None,
+            alters=partial(altered, domain=domain),
+        )
+        seen = partial(observed, holding="Knife-1", hand=(0.3, -0.3, 1.0))
+        first = eyes.perceive(seen([COUNTER, lettuce, knife], NEAR))
+        node = first.get("Lettuce-1")
+        assert node is not None and node.box_m is not None
+        eyes.acted(cut, succeeded)
+        before = [] if shown else [wall]
+        scene = [COUNTER, lettuce, knife, *before]
+        node = eyes.perceive(seen(scene, NEAR, time_s=1.0)).get("Lettuce-1")
+        assert node is not None
+        assert (node.box_m is None) is (succeeded and not shown)

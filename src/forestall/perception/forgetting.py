@@ -6,15 +6,16 @@ every look would else fill the memory with things that are nowhere.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
-from forestall.domain.model import Domain
+from forestall.domain.model import LOCATED, Domain
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.geometry import filled
 from forestall.perception.surfaces import SURFACE, fixed
 from forestall.perception.tracks import Track
+from forestall.types.facts import Change
 from forestall.types.graph import Seen
 
 Tracks = dict[str, Track]
@@ -26,6 +27,24 @@ def remove(tracks: Tracks, name: str, heir: str | None = None) -> None:
     for child in tracks.values():
         if child.parent is not None and child.parent[1] == name:
             child.parent = None if heir is None else (child.parent[0], heir)
+
+
+def doubt(tracks: Tracks, changes: Iterable[Change], succeeded: bool) -> None:
+    """Forget what was read of some states, until they are read again.
+
+    Until then they are presumed to be what they were meant to become, or what they were before if
+    what should have changed them is said to have failed. A thing that was to turn into others is
+    nowhere until it is seen.
+    """
+    for name, attribute, before, after in changes:
+        if name not in tracks:
+            continue
+        if attribute == LOCATED:
+            if succeeded:
+                tracks[name].lose()
+        else:
+            tracks[name].states.pop(attribute, None)
+            tracks[name].presumed[attribute] = after if succeeded else before
 
 
 def merge_renamed(

@@ -15,7 +15,7 @@ from forestall.domain.model import Domain
 from forestall.domain.truth import is_shut
 from forestall.perception.blocking import blocking, cuts
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.forgetting import give_way, let_go, merge_renamed, remove
+from forestall.perception.forgetting import doubt, give_way, let_go, merge_renamed, remove
 from forestall.perception.geometry import Stack, Thing
 from forestall.perception.own_names import settled
 from forestall.perception.relations import directions
@@ -63,15 +63,8 @@ class SceneMemory:
         self.forgotten: tuple[str, ...] = ()  # in the newest observation, for want of room
 
     def doubt(self, changes: Iterable[Change], succeeded: bool) -> None:
-        """Forget what was read of some states, until they are read again.
-
-        Until then they are presumed to be what they were meant to become, or what they were before
-        if what should have changed them is said to have failed.
-        """
-        for name, attribute, before, after in changes:
-            if name in self.tracks:
-                self.tracks[name].states.pop(attribute, None)
-                self.tracks[name].presumed[attribute] = after if succeeded else before
+        """See `forgetting.doubt`."""
+        doubt(self.tracks, changes, succeeded)
 
     # --- integration ----------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ Called by the perceiver, through the callable that assembly gives it; calls the 
 
 from __future__ import annotations
 
-from forestall.domain.model import Domain
+from forestall.domain.model import LOCATED, Domain
 from forestall.planning.execute import Refusal, apply
 from forestall.planning.validate import observed
 from forestall.types.facts import Change
@@ -21,7 +21,8 @@ def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[Change
     known.
 
     Returns:
-        In order; processes that the skill sets off are among what changes.
+        In order; processes that the skill sets off are among what changes. Of a thing that is no
+        more, since it was cut or broken into others, it is that it is located.
     """
     if subtask.skill not in domain.skills:
         return ()
@@ -29,7 +30,12 @@ def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[Change
     after = apply(before.copy(), subtask)
     if isinstance(after, Refusal):
         return ()
-    return tuple(
+    ended = tuple(
+        Change(node.id, LOCATED, "true", "false")
+        for node in graph.nodes
+        if node.id in before.kinds and node.id not in after.kinds
+    )
+    return ended + tuple(
         Change(node.id, attribute, old, new)
         for node in graph.nodes
         for attribute, _ in node.states

@@ -23,7 +23,10 @@ GRIPPER = "gripper"
 
 
 class Change(NamedTuple):
-    """A state of a thing that something may have changed: from a value to another."""
+    """A state of a thing that something may have changed: from a value to another.
+
+    Of what may be no more the attribute is "located".
+    """
 
     thing: str
     attribute: str
