@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from forestall.planning.validate import GraphValidator
 from forestall.replanning.symbolic import PlannerReplanner
-from forestall.strategies.intervention import Clock, Intervention, checked
+from forestall.strategies.intervention import Clock, Intervention, checked, would_not_work
 from forestall.types.facts import Literal
+from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import Decision, Diagnosis
 from planning.corpus import DOMAIN, PLANS, home_of, scene
@@ -28,11 +31,11 @@ def before_slicing(bread: bool) -> BoundaryContext:
     return context("toast-bread", PLANS["toast-bread"], 2, graph)
 
 
-def alarmed(at: BoundaryContext) -> StrategyAnswer:
+def alarmed(at: BoundaryContext, why: Diagnosis = HELD) -> StrategyAnswer:
     validator = GraphValidator(DOMAIN)
     steps_in = Intervention(PlannerReplanner(validator, DOMAIN), validator, 2)
     steps_in.begin(at)
-    return steps_in.alarm(at, checked("a judge", False, ""), HELD, Clock())
+    return steps_in.alarm(at, checked("a judge", False, ""), why, Clock())
 
 
 def test_a_thing_that_the_rest_needs_is_looked_for_before_the_repair() -> None:
@@ -48,3 +51,37 @@ def test_nothing_is_looked_for_where_the_repair_is_found() -> None:
     assert answer.decision is Decision.REPLAN and answer.replan is not None
     assert not answer.replan.looking_for and answer.replan.plan is not None
     assert "pick_up(Knife-1)" in answer.replan.plan.texts()
+
+
+EARLY = PLANS["store-egg"].texts()[:5]
+"""The bowl with the egg stays outside; the egg is in the fridge, which is shut."""
+WRONG = [t.replace("Bowl", "Pan") if k > 4 else t for k, t in enumerate(PLANS["store-egg"].texts())]
+"""A pan is put into the fridge."""
+
+
+@pytest.mark.parametrize(
+    ("plan", "index", "decision"),
+    [
+        (EARLY, 0, Decision.PROCEED),  # the robot goes to the fridge
+        (EARLY, 1, Decision.PROCEED),  # and opens it: then the egg is seen, and a repair found
+        (WRONG, 7, Decision.STOP),  # this very step fails
+    ],
+)
+def test_without_a_repair_it_goes_on_as_long_as_nothing_is_lost_by_it(
+    plan: tuple[str, ...], index: int, decision: Decision
+) -> None:
+    graph = scene(home_of("store-egg"), "Pan-1 on CounterTop-1", "Fridge-1 hidden")
+    inside = {r.subject for r in graph.relations if r.object == "Fridge-1"}
+    graph = replace(
+        graph,
+        nodes=tuple(n for n in graph.nodes if n.id not in inside),
+        relations=tuple(r for r in graph.relations if r.subject not in inside),
+    )
+    at = replace(context("store-egg", Plan.parse(plan), index, graph), may_look=False)
+    validator = GraphValidator(DOMAIN)
+    check = validator.check(Plan.parse(plan[index:]), graph, at.task.goal)
+    assert not check.ok
+    answer = alarmed(at, would_not_work(check))
+    assert answer.decision is decision and answer.verdict is not None
+    assert answer.verdict.decision is Decision.REPLAN
+    assert ("there is time yet" in answer.why) is (decision is Decision.PROCEED)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from forestall.domain.model import Domain
+from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut
-from forestall.types.facts import Literal, Truth
+from forestall.types.facts import Literal, Truth, category_of
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.plan import Subtask
 
@@ -61,4 +61,29 @@ def searched(name: str, facts: Sequence[Literal], domain: Domain) -> tuple[str, 
         x.args[1]
         for x in facts
         if x.value == "false" and x.predicate in domain.containing and x.args[0] == name
+    )
+
+
+def is_there(graph: SceneGraph, name: str) -> bool:
+    """Whether some thing of a name or of a category is located, or in view."""
+    return any(
+        n.box_m is not None or n.seen is Seen.VISIBLE
+        for n in graph.nodes
+        if name in (n.id, n.category)
+    )
+
+
+def missing(facts: Iterable[Literal], graph: SceneGraph, domain: Domain) -> tuple[Literal, ...]:
+    """What is to be in some state or place and is nowhere to be seen, as facts that it is located.
+
+    Hands are felt, and what a skill makes of other things need not be there yet.
+    """
+    made = {kind for c in domain.categories for kind in domain.becomes(c)}
+    names = (a for x in facts if x.value != "false" for a in x.args)
+    return tuple(
+        Literal(LOCATED, (name,))
+        for name in dict.fromkeys(names)
+        if name not in domain.robot.hands
+        and category_of(domain.canonical(name)) not in made
+        and not is_there(graph, name)
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from forestall.domain.looked import in_sight, searched
+from forestall.domain.looked import in_sight, is_there, searched
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut
 from forestall.planning.places import positions
@@ -37,7 +37,7 @@ OPEN_S = 6.0
 def sought(wanted: Sequence[Literal], graph: SceneGraph) -> tuple[str, ...]:
     """Things whose place must become known and that no node of the graph can be."""
     names = (x.args[0] for x in wanted if x.predicate == LOCATED and x.value == "true")
-    return tuple(dict.fromkeys(n for n in names if not _is_there(graph, n)))
+    return tuple(dict.fromkeys(n for n in names if not is_there(graph, n)))
 
 
 def hiding_places(
@@ -142,8 +142,3 @@ def in_vain(lost: Sequence[str], known: Sequence[Literal], domain: Domain) -> tu
     """What is said of things that were looked for wherever they may be."""
     found = {name: searched(name, known, domain) for name in lost}
     return tuple(f"{n} was looked for in {', '.join(p)}{IN_VAIN}" for n, p in found.items() if p)
-
-
-def _is_there(graph: SceneGraph, name: str) -> bool:
-    return any(n.box_m is not None or n.seen is Seen.VISIBLE for n in graph.nodes
-               if name in (n.id, n.category))  # fmt: skip

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 
 from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.brought import came_about
-from forestall.domain.looked import looked_into, looked_over, not_there
+from forestall.domain.looked import looked_into, looked_over, missing, not_there
 from forestall.domain.model import LOCATED, Domain
+from forestall.domain.undo import irreversible_skills
 from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.types.episode import SkillStatus
@@ -255,8 +256,10 @@ class Intervention:
 
         What must change is mended when the thing is found. The failed repair where that is not why.
         """
-        lost = () if failed.check is None else failed.check.lacking
-        lost = tuple(x for x in lost if x.predicate == LOCATED)
+        lacking = () if failed.check is None else failed.check.lacking
+        nowhere = missing(diagnosis.must_change, context.graph, self._validator.domain)
+        named = (*(x for x in lacking if x.predicate == LOCATED), *nowhere)
+        lost = tuple(dict.fromkeys(named))
         if not lost or set(lost) <= set(diagnosis.must_change):
             return failed
         wanted = self._with_places(replace(diagnosis, must_change=lost))
@@ -284,13 +287,34 @@ class Intervention:
         replan: Replan,
         clock: Clock,
     ) -> StrategyAnswer:
-        """Go on only if the plan at hand still checks out on what is seen."""
+        """Go on only if the plan at hand still checks out on what is seen, or there is time yet."""
         check = self.check_plan(context, clock)
-        decision = Decision.PROCEED if check.ok else Decision.STOP
-        why = "no repair found; " + (
-            "the plan at hand still checks out" if check.ok else f"stopped: {check.reason}"
-        )
+        decision, why = Decision.PROCEED, "the plan at hand still checks out"
+        if not check.ok and self._may_wait(context, check):
+            why = f"there is time yet: {check.reason}"
+        elif not check.ok:
+            decision, why = Decision.STOP, f"stopped: {check.reason}"
+        why = f"no repair found; {why}"
         return StrategyAnswer(decision, verdict, diagnosis, replan, why, clock.items())
+
+    def _may_wait(self, context: BoundaryContext, check: PlanCheck) -> bool:
+        """Whether a plan that will fail fails later, and the next subtask takes nothing away.
+
+        It runs from what is seen, can be undone, and brings about nothing that must never be. What
+        it shows may be what a repair lacks. Where things are missing one has looked for them.
+        """
+        domain = self._validator.domain
+        now = len(rest_of(context, domain)) - len(context.remaining())
+        if check.step is not None and check.step <= now:
+            return False
+        if check.lacking and all(x.predicate == LOCATED for x in check.lacking):
+            return False
+        if context.subtask.skill in irreversible_skills(domain):
+            return False
+        never = replace(context.task.goal, literals=())
+        alone = self._validator.check(Plan((context.subtask,)), context.graph, never)
+        harmless = alone.step is None and all(x.predicate == LOCATED for x in alone.unmet)
+        return harmless and not relied_on_now(alone, context, domain)
 
 
 def _is_the_old(plan: Plan | None, context: BoundaryContext) -> bool:
