@@ -46,6 +46,19 @@ def test_a_thing_that_the_rest_needs_is_looked_for_before_the_repair() -> None:
     assert "open_obj(Drawer-1)" in answer.replan.plan.texts()
 
 
+def test_what_is_looked_for_already_is_not_looked_for_anew_on_the_way() -> None:
+    """Each step of the search finds the same fault: that must not begin it again."""
+    at = before_slicing(bread=False)
+    validator = GraphValidator(DOMAIN)
+    steps_in = Intervention(PlannerReplanner(validator, DOMAIN), validator, 2)
+    steps_in.begin(at)
+    first, second = (
+        steps_in.alarm(at, checked("a judge", False, ""), HELD, Clock()) for _ in range(2)
+    )
+    assert first.replan is not None and first.replan.looking_for == ("Bread",)
+    assert second.replan is not None and not second.replan.looking_for
+
+
 def test_nothing_is_looked_for_where_the_repair_is_found() -> None:
     answer = alarmed(before_slicing(bread=True))
     assert answer.decision is Decision.REPLAN and answer.replan is not None

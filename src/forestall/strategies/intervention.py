@@ -259,7 +259,7 @@ class Intervention:
         lacking = () if failed.check is None else failed.check.lacking
         nowhere = missing(diagnosis.must_change, context.graph, self._validator.domain)
         named = (*(x for x in lacking if x.predicate == LOCATED), *nowhere)
-        lost = tuple(dict.fromkeys(named))
+        lost = tuple(x for x in dict.fromkeys(named) if x.args[0] not in self._sought)
         if not lost or set(lost) <= set(diagnosis.must_change):
             return failed
         wanted = self._with_places(replace(diagnosis, must_change=lost))
