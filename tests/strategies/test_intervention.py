@@ -10,6 +10,7 @@ from forestall.planning.validate import GraphValidator
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.strategies.intervention import Clock, Intervention, checked, would_not_work
 from forestall.types.facts import Literal
+from forestall.types.graph import SceneGraph
 from forestall.types.plan import Plan
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
 from forestall.types.verdict import Decision, Diagnosis
@@ -23,11 +24,7 @@ def before_slicing(bread: bool) -> BoundaryContext:
     """Before the bread is sliced, with empty hands; the bread may be nowhere to be seen."""
     graph = scene(home_of("toast-bread"), "Drawer-1 hidden")
     if not bread:
-        graph = replace(
-            graph,
-            nodes=tuple(n for n in graph.nodes if n.category != "Bread"),
-            relations=tuple(r for r in graph.relations if not r.subject.startswith("Bread-")),
-        )
+        graph = without(graph, {n.id for n in graph.nodes if n.category == "Bread"})
     return context("toast-bread", PLANS["toast-bread"], 2, graph)
 
 
@@ -83,18 +80,56 @@ WRONG = [t.replace("Bowl", "Pan") if k > 4 else t for k, t in enumerate(PLANS["s
 def test_without_a_repair_it_goes_on_as_long_as_nothing_is_lost_by_it(
     plan: tuple[str, ...], index: int, decision: Decision
 ) -> None:
+    answer = without_a_repair(egg_in_the_fridge(plan, index))
+    assert answer.decision is decision
+    assert ("there is time yet" in answer.why) is (decision is Decision.PROCEED)
+
+
+def test_without_a_repair_what_must_never_be_is_not_brought_about() -> None:
+    at = egg_in_the_fridge(EARLY, 1)
+    goal = replace(at.task.goal, never=(Literal.parse("open(Fridge-1)=open"),))
+    answer = without_a_repair(replace(at, task=replace(at.task, goal=goal)))
+    assert answer.decision is Decision.STOP
+
+
+@pytest.mark.parametrize(
+    ("index", "decision"),
+    [
+        (1, Decision.PROCEED),  # the knife is picked up, and can be put down
+        (3, Decision.STOP),  # the bread would be sliced for good, and nothing would come of it
+    ],
+)
+def test_without_a_repair_what_cannot_be_undone_is_not_begun(
+    index: int, decision: Decision
+) -> None:
+    graph = scene(home_of("toast-bread"), *(["Knife-1 held"] if index > 1 else []))
+    graph = without(graph, {n.id for n in graph.nodes if n.category == "Toaster"})
+    plan = Plan(PLANS["toast-bread"].subtasks[:5])
+    answer = without_a_repair(context("toast-bread", plan, index, graph))
+    assert answer.decision is decision
+
+
+def without(graph: SceneGraph, things: set[str]) -> SceneGraph:
+    """A scene in which there is nothing to be known of these."""
+    return replace(
+        graph,
+        nodes=tuple(n for n in graph.nodes if n.id not in things),
+        relations=tuple(r for r in graph.relations if not things & {r.subject, r.object}),
+    )
+
+
+def egg_in_the_fridge(plan: tuple[str, ...], index: int) -> BoundaryContext:
+    """Before a step of a plan that fails, with the egg in a shut fridge into which nobody saw."""
     graph = scene(home_of("store-egg"), "Pan-1 on CounterTop-1", "Fridge-1 hidden")
     inside = {r.subject for r in graph.relations if r.object == "Fridge-1"}
-    graph = replace(
-        graph,
-        nodes=tuple(n for n in graph.nodes if n.id not in inside),
-        relations=tuple(r for r in graph.relations if r.subject not in inside),
-    )
-    at = replace(context("store-egg", Plan.parse(plan), index, graph), may_look=False)
-    validator = GraphValidator(DOMAIN)
-    check = validator.check(Plan.parse(plan[index:]), graph, at.task.goal)
+    return context("store-egg", Plan.parse(plan), index, without(graph, inside))
+
+
+def without_a_repair(at: BoundaryContext) -> StrategyAnswer:
+    """What follows from an alarm of the plan check, which has had its second look."""
+    at = replace(at, may_look=False)
+    check = GraphValidator(DOMAIN).check(Plan(at.remaining()), at.graph, at.task.goal)
     assert not check.ok
     answer = alarmed(at, would_not_work(check))
-    assert answer.decision is decision and answer.verdict is not None
-    assert answer.verdict.decision is Decision.REPLAN
-    assert ("there is time yet" in answer.why) is (decision is Decision.PROCEED)
+    assert answer.verdict is not None and answer.verdict.decision is Decision.REPLAN
+    return answer

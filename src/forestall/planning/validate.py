@@ -7,7 +7,7 @@ and why, and then the goal facts that the plan leaves unmet.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 from forestall.domain.model import LOCATED, Domain
@@ -110,7 +110,8 @@ def unmet(
 
     Of bindings under which as few fail, the one of things that a plan deals with is the best:
     those in `handled`, or in what it handles. A literal of `never` that held at any time is
-    returned as it stands, bound. Where there are more bindings than are gone through, a goal may
+    returned as it stands, bound. What is nowhere is said to lack, and of the rest of the goal then
+    only what was never to happen. Where there are more bindings than are gone through, a goal may
     be called unmet that is met, and never the other way round.
     """
     final = states[-1]
@@ -145,7 +146,10 @@ def unmet(
         return best
     lacking = dict.fromkeys(c for _, c in goal.variables if not final.matches(c))
     lacking = lacking or dict.fromkeys(c for _, c in goal.variables)  # fewer than are asked for
-    return tuple(Literal(LOCATED, (c,)) for c in lacking)
+    rest = tuple((v, c) for v, c in goal.variables if c not in lacking)
+    never = tuple(x for x in goal.never if _variables(x) <= {v for v, _ in rest})
+    spoilt = unmet(states, replace(goal, variables=rest, literals=(), never=never), handled)
+    return (*(Literal(LOCATED, (c,)) for c in lacking), *spoilt)
 
 
 def _dealt_with(state: State, thing: str, handled: Collection[str]) -> bool:
@@ -194,7 +198,11 @@ def bindings(
 
 def _only(literal: Literal, variable: str) -> bool:
     """Whether a literal speaks of this variable and of no other."""
-    return {a for a in literal.args if a.startswith("?")} == {variable}
+    return _variables(literal) == {variable}
+
+
+def _variables(literal: Literal) -> set[str]:
+    return {a for a in literal.args if a.startswith("?")}
 
 
 def as_checked(plan: Plan, check: PlanCheck, state: State) -> Plan:
