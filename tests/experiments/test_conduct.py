@@ -16,7 +16,7 @@ from forestall.assembly.configuration import Given
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, EFFORT, ROWS, ResultsFolder, episodes_in
-from forestall.experiments.runs import PART, Choice, Run, Settings, by_scene, runs_for
+from forestall.experiments.runs import PART, QUICK_TASKS, Choice, Run, Settings, by_scene, runs_for
 from forestall.experiments.worker import Work
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
@@ -93,8 +93,11 @@ def test_a_quick_experiment_is_a_balanced_tenth() -> None:
                 continue
             assert len(found) == max(1, round(len(every) * part))
             assert len({c.task for c in found}) == min(len(found), len({c.task for c in every}))
-        assert len({r.case.task for r in some if r.profile == "kind"}) >= 4, "not one task alone"
-    assert {r.case for r in quick} <= {r.case for r in usual} <= {r.case for r in whole}
+        of_kind = {r.case.task for r in some if r.profile == "kind"}
+        assert len(of_kind) >= (1 if some is quick else 4), "not one task alone"
+    assert {r.case for r in usual} <= {r.case for r in whole} >= {r.case for r in quick}
+    rooms = {(r.profile, r.case.task, r.case.seed) for r in quick}
+    assert len(rooms) == QUICK_TASKS + 2, "those of the sets, a long one, the kind one"
     honest = {r.case for r in usual if r.profile == "honest"}
     long = {"long", "long-undisturbed"}
     assert {c.twin for c in honest if c.set not in long} <= honest

@@ -75,12 +75,14 @@ ABLATED = 0.5
 QUICK = 0.1
 """Of the cases that are run otherwise, in a quick experiment."""
 
+QUICK_TASKS = 4
+"""Of a quick experiment in the honest household; the longer ones beside. In the kind one 1."""
+
 QUICK_DEMONSTRATIONS = 1
 """Of each task in the honest household, in a quick experiment."""
 
 QUICK_TURN = 6
-"""Of the strategies that step in on a case of a quick experiment every sixth does, others with the
-next set. Trying again counts among them there."""
+"""Of strategies that step in, and trying again, each sixth acts on a case, others on the next."""
 
 PAPER_DETECTOR = "scene-graph"
 
@@ -91,7 +93,7 @@ _WITH_PART = ("transfer", "all")
 """Experiments that take a part of every set."""
 
 _ELSEWHERE = " of other tasks"
-"""Ends what is said of a memory that has none of the task at hand."""
+"""Ends what is said of a memory without the task at hand."""
 
 OWN = (DETECTOR.name, STRATEGY.name)
 """The kinds of parts that an experiment chooses by itself, run by run."""
@@ -198,10 +200,9 @@ class Choice:
         sets: only cases of these; all by default.
         strategies: only these; all by default.
         profiles: of the household; by default the honest one, and for "all" both.
-        part: of the cases of each set in "all" and "transfer", from all tasks in turn: `PART` by
-            default.
-        quick: a tenth of that; of the strategies that step in one case of each set has a sixth, and
-            of the undisturbed runs there are no twins.
+        part: of the cases of each set in "all" and "transfer", from all tasks in turn.
+        quick: a tenth of that, of few tasks; of the strategies that step in one case of each set
+            has a sixth, and of the undisturbed runs there are no twins.
         demonstrations: of each task in the honest household, each another way to do it; by default
             `DEMONSTRATIONS`, `QUICK_DEMONSTRATIONS` in a quick experiment.
         models: whether a language model reasons in an ablation, too.
@@ -313,8 +314,9 @@ def _sets(profile: str, choice: Choice) -> dict[str, Sequence[Case]]:
         every: Sequence[Case] = cases(of, choice.split, choice.rounds, further=honest)
         part = choice.part if choice.experiment in _WITH_PART else 1.0
         if choice.quick:
-            part *= QUICK
-        if part < 1:
+            task = _tasks()[place % QUICK_TASKS if honest else 0]  # sets share rooms, and memories
+            every = _some(every, part * QUICK, 0, _place(task, every))
+        elif part < 1:
             every = _some(every, part, TURN * place if honest else 0, place)
         found[of] = every
     if honest and not choice.quick:
@@ -331,6 +333,11 @@ def _some(found: Sequence[Case], part: float, turn: int = 0, task: int = 0) -> S
     a smaller part is in a larger.
     """
     return in_turn(found, max(1, round(len(found) * part)), turn, task)
+
+
+def _place(task: str, found: Sequence[Case]) -> int:
+    """The place of a task among those of a set; 0 if it is none of them."""
+    return next((k for k, t in enumerate(dict.fromkeys(c.task for c in found)) if t == task), 0)
 
 
 @cache
