@@ -15,7 +15,7 @@ from forestall.perception.unproject import Cloud
 def sighting(pixels: int, **states: str | None) -> Sighting:
     nothing = np.zeros(3)
     cloud = Cloud(np.zeros((1, 3)), nothing, nothing, nothing, pixels)
-    return Sighting(0, "Mug", cloud, states, None)
+    return Sighting(0, "Mug", cloud, states, {}, None)
 
 
 @pytest.mark.parametrize(
@@ -31,8 +31,7 @@ def sighting(pixels: int, **states: str | None) -> Sighting:
 def test_a_glimpse_does_not_contradict_a_view(
     views: list[Sighting], said: Mapping[str, str]
 ) -> None:
-    assert readings(views, 0.5) == said
-    assert readings(views[::-1], 0.5) == said
+    assert readings(views, 0.5) == readings(views[::-1], 0.5) == (said, dict.fromkeys(said, 1.0))
 
 
 def test_in_the_hand_only_contents_change() -> None:
@@ -65,6 +64,45 @@ def test_a_sliver_confirms_and_contradicts_nothing() -> None:
     }
     see(0.0021, filled="empty", dirty="dirty")
     assert (track.states["filled"], track.states["dirty"]) == ("empty", "dirty"), "enough of it"
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "believed"),
+    [
+        (0.999, 0.88, None),  # a doubtful look does not undo a sure one, and casts doubt on it
+        (0.999, 0.99, "dirty"),
+        (0.81, 0.88, None),
+        (0.81, 0.95, "dirty"),  # a sure look undoes a doubtful one sooner
+        (0.999, 1.0, "dirty"),
+        (None, 0.88, "dirty"),  # nothing was known
+    ],
+)
+def test_what_contradicts_a_state_must_outweigh_it(
+    before: float | None, now: float, believed: str | None
+) -> None:
+    track = Track("Pot-1", "Pot")
+
+    def look(value: str, confidence: float) -> None:
+        seen = replace(sighting(100, dirty=value), sure={"dirty": confidence})
+        take_states(track, [seen], False, (), True, PerceptionConfig())
+
+    if before is not None:
+        look("clean", before)
+    for _ in range(3):
+        look("dirty", now)
+        assert track.states.get("dirty") == believed, "the same look again tells nothing new"
+    assert track.presumed.get("dirty") == (None if believed else "clean")
+    look("clean", 1.0)
+    assert track.states["dirty"] == "clean"
+
+
+def test_what_a_skill_should_have_done_is_not_undone_by_a_doubtful_look() -> None:
+    track = Track("Pot-1", "Pot", presumed={"dirty": "clean"})
+    seen = replace(sighting(100, dirty="dirty"), sure={"dirty": 0.9})
+    take_states(track, [seen], False, (), True, PerceptionConfig())
+    assert "dirty" not in track.states
+    take_states(track, [replace(seen, sure={"dirty": 0.99})], False, (), True, PerceptionConfig())
+    assert track.states["dirty"] == "dirty", "the skill has failed"
 
 
 def test_a_part_of_the_furniture_is_believed() -> None:

@@ -96,6 +96,9 @@ class PerceptionConfig:
             observation, say nothing about its states.
         sliver_share: what shows less than this share of the area that it has shown before
             contradicts nothing that is believed of its states, unless it is furniture.
+        steady: probability that a state is still what it was surely read to be, or what a skill
+            should have made of it (skills of the honest household fail in 5 to 10 %).
+        outweighs: probability from which a reading is believed against that.
         same_share: share of the smaller of two boxes that both must have for a new thing to be one
             of the same category that was there before and is not seen.
         max_lost: things of one category whose place is lost that are remembered; the last ones.
@@ -178,6 +181,8 @@ class PerceptionConfig:
     interior_share: float = 0.1
     glimpse_share: float = 0.5
     sliver_share: float = 0.25
+    steady: float = 0.9
+    outweighs: float = 0.8
     same_place_m: float = 0.3
     same_gap_m: float = 0.05
     same_gap_share: float = 0.035

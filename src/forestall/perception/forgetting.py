@@ -44,6 +44,7 @@ def doubt(tracks: Tracks, changes: Iterable[Change], succeeded: bool) -> None:
                 tracks[name].lose()
         else:
             tracks[name].states.pop(attribute, None)
+            tracks[name].sure.pop(attribute, None)
             tracks[name].presumed[attribute] = after if succeeded else before
 
 
@@ -90,8 +91,7 @@ def join(tracks: Tracks, part: str, whole: str) -> None:
 
 def _inherit(track: Track, old: Track) -> None:
     """What was known of a thing under another name."""
-    known = {a: v for a, v in old.states.items() if v is not None}
-    track.states = {**known, **track.states}
+    track.remember(old)
     track.interior_seen |= old.interior_seen
     track.shown = np.union1d(track.shown, old.shown)
 

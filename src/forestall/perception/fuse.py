@@ -131,7 +131,9 @@ class SceneMemory:
             track.vague = track.points_world_m is None
             track.pixels = int(np.count_nonzero(view.labels == label))
             track.last_seen_s = time_s
-            track.states.update((a, v) for a, v in view.states[label].items() if v is not None)
+            told = {a: v for a, v in view.states[label].items() if v is not None}
+            track.states.update(told)
+            track.sure.update((a, view.sure[label].get(a, 1.0)) for a in told)
 
     def _place(self, track: Track, fresh: Points, fate: Fates | None) -> None:
         """Set a track's cloud from the newest views and what they leave standing of the old."""

@@ -57,6 +57,12 @@ class LearnedStateEstimator:
 
         Of a picture unlike those that the encoder was made for nothing is told.
         """
+        return [states for states, _ in self.estimate_with_confidence(frame, detections)]
+
+    def estimate_with_confidence(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> Sequence[tuple[Mapping[str, str | None], Mapping[str, float]]]:
+        """See `ConfidentStateEstimator`."""
         asked = [
             (i, self.questions(d.category))
             for i, d in enumerate(detections)
@@ -67,9 +73,11 @@ class LearnedStateEstimator:
         kind = asked and of_its_kind(frame.rgb, self._encoder.reading.least_contrast)
         large = [(i, q) for i, q in asked if kind and np.count_nonzero(detections[i].mask) >= least]
         rows = self._encoder.encode_crops(frame.rgb, [detections[i].mask for i, _ in large])
-        out: list[Mapping[str, str | None]] = [{} for _ in detections]
+        out: list[tuple[Mapping[str, str | None], Mapping[str, float]]] = [({}, {})] * len(
+            detections
+        )
         for i, questions in asked:
-            out[i] = {q.attribute: None for q in questions}
+            out[i] = {q.attribute: None for q in questions}, {}
         for (i, questions), row in zip(large, rows, strict=True):
             out[i] = self._answers(questions, row)
         return out
@@ -103,14 +111,17 @@ class LearnedStateEstimator:
 
     def _answers(
         self, questions: Sequence[Question], row: npt.NDArray[np.float32]
-    ) -> Mapping[str, str | None]:
+    ) -> tuple[Mapping[str, str | None], Mapping[str, float]]:
         found: dict[str, str | None] = {}
+        sure: dict[str, float] = {}
         for question in questions:
             confidence = self.probabilities(question, row[None])[0]
             best = int(confidence.argmax())
-            sure = confidence[best] >= self._encoder.reading.least_confidence(question.attribute)
-            found[question.attribute] = question.values[best] if sure else None
-        return unobscured(found, self._domain)
+            sure[question.attribute] = float(confidence[best])
+            enough = self._encoder.reading.least_confidence(question.attribute)
+            told = sure[question.attribute] >= enough
+            found[question.attribute] = question.values[best] if told else None
+        return unobscured(found, self._domain), sure
 
     def _vectors(self, category: str, attribute: str) -> npt.NDArray[np.float32]:
         rows = []

@@ -234,5 +234,6 @@ def _renamed(view: View, names: Mapping[str, str], categories: Mapping[str, str]
             for old, name, category in zip(view.ids, ids, view.categories, strict=True)
         ),
         states=tuple({} if n in names else s for n, s in zip(view.ids, view.states, strict=True)),
+        sure=tuple({} if n in names else s for n, s in zip(view.ids, view.sure, strict=True)),
         guessed=frozenset(names.get(n, n) for n in view.guessed),
     )

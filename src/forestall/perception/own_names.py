@@ -196,8 +196,7 @@ def _found_again(
         for row, column in zip(*linear_sum_assignment(np.array(gaps)), strict=True):
             names[new[row]] = lost[column].id
     for name, old in names.items():
-        known = {a: v for a, v in tracks[old].states.items() if v is not None}
-        tracks[name].states = {**known, **tracks[name].states}
+        tracks[name].remember(tracks[old])
         del tracks[old]
     _rename(tracks, names)
     return names

@@ -33,7 +33,12 @@ from forestall.perception.unproject import (
     clouds,
     label_image,
 )
-from forestall.seams.perceiving import ImageEncoder, Segmenter, StateEstimator
+from forestall.seams.perceiving import (
+    ConfidentStateEstimator,
+    ImageEncoder,
+    Segmenter,
+    StateEstimator,
+)
 from forestall.types.facts import Change, category_of
 from forestall.types.feature import quantised
 from forestall.types.finding import Finding, refuse
@@ -225,12 +230,7 @@ class GraphPerceiver:
         used: Collection[str],
     ) -> View:
         detections, labels = masks.detections, masks.labels
-        states = self._estimator.estimate(frame, detections)
-        if len(states) != len(detections):
-            raise PerceptionError(
-                f"the state estimator {self._estimator.name!r} answered for {len(states)} of "
-                f"{len(detections)} detections"
-            )
+        states, sure = self._read(frame, detections)
         stays = [fixed(self._domain, d.category) for d in detections]
         voxel_m = [self._config.fixture_voxel_m if f else self._config.voxel_m for f in stays]
         found = clouds(frame, labels, voxel_m, self._config, [not f for f in stays])
@@ -249,7 +249,8 @@ class GraphPerceiver:
             ids=tuple(names),
             categories=tuple(d.category for d in detections),
             clouds=tuple(found),
-            states=tuple(states),
+            states=states,
+            sure=sure,
             features=self._features(frame, detections, found),
             unlocated=tuple(_placeless(frame, detections, labels, found, known)),
             guessed=frozenset(
@@ -257,6 +258,22 @@ class GraphPerceiver:
             ),
             looks=tuple(looks),
         )
+
+    def _read(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> tuple[tuple[Mapping[str, str | None], ...], tuple[Mapping[str, float], ...]]:
+        """States of detections, and how sure they are where their estimator says so."""
+        estimator = self._estimator
+        if isinstance(estimator, ConfidentStateEstimator):
+            told = estimator.estimate_with_confidence(frame, detections)
+        else:
+            told = [(states, {}) for states in estimator.estimate(frame, detections)]
+        if len(told) != len(detections):
+            raise PerceptionError(
+                f"the state estimator {estimator.name!r} answered for {len(told)} of "
+                f"{len(detections)} detections"
+            )
+        return tuple(states for states, _ in told), tuple(sure for _, sure in told)
 
     def _features(
         self, frame: Frame, detections: Sequence[Detection], found: Sequence[Cloud | None]

@@ -28,6 +28,7 @@ class Sighting:
     category: str
     cloud: Cloud
     states: Mapping[str, str | None]
+    sure: Mapping[str, float]
     feature: bytes | None
     look: Points | None = None
     area_m2: float = 0.0
@@ -38,12 +39,11 @@ def gather(views: Sequence[View]) -> dict[str, list[Sighting]]:
     found: dict[str, list[Sighting]] = {}
     for index, view in enumerate(views):
         looks = view.looks or (None,) * len(view.ids)
-        for name, category, cloud, states, feature, look in zip(
-            view.ids, view.categories, view.clouds, view.states, view.features, looks, strict=True
-        ):
+        of_view = (view.ids, view.categories, view.clouds, view.states, view.sure, view.features)
+        for name, category, cloud, states, sure, feature, look in zip(*of_view, looks, strict=True):
             if cloud is not None:
                 area_m2 = _area_m2(view, cloud)
-                sighting = Sighting(index, category, cloud, states, feature, look, area_m2)
+                sighting = Sighting(index, category, cloud, states, sure, feature, look, area_m2)
                 found.setdefault(name, []).append(sighting)
     return found
 
@@ -67,8 +67,12 @@ def unlocated(views: Sequence[View]) -> dict[str, tuple[View, int]]:
     return {name: (view, label) for name, (_, view, label) in found.items()}
 
 
-def readings(sightings: Sequence[Sighting], share: float) -> dict[str, str]:
+def readings(
+    sightings: Sequence[Sighting], share: float
+) -> tuple[dict[str, str], dict[str, float]]:
     """What one observation says about a thing's states; the larger the view, the more it counts.
+
+    Values, and how sure they are.
 
     Args:
         sightings: of one thing, at least one.
@@ -77,10 +81,13 @@ def readings(sightings: Sequence[Sighting], share: float) -> dict[str, str]:
     """
     least = share * max(s.cloud.pixels for s in sightings)
     found: dict[str, str] = {}
+    sure: dict[str, float] = {}
     for sighting in sorted(sightings, key=lambda s: s.cloud.pixels):
         if sighting.cloud.pixels >= least:
-            found.update((a, v) for a, v in sighting.states.items() if v is not None)
-    return found
+            told = {a: v for a, v in sighting.states.items() if v is not None}
+            found.update(told)
+            sure.update((a, sighting.sure.get(a, 1.0)) for a in told)
+    return found, sure
 
 
 def take_states(
@@ -102,12 +109,16 @@ def take_states(
             of furniture often shows a part of itself.
         config: thresholds.
     """
-    read = readings(sightings, config.glimpse_share)
+    read, sure = readings(sightings, config.glimpse_share)
     if held:
         read = in_hand(read, track.states, changing)
     area_m2 = max(s.area_m2 for s in sightings)
     if movable and area_m2 < config.sliver_share * track.shown_m2:
-        read = through_a_gap(read, track)
+        read = contradicting(read, track, ())
+    read = contradicting(read, track, outweighing(read, sure, track, config))
+    for attribute, value in read.items():
+        before = track.sure.get(attribute, 1.0) if track.states.get(attribute) == value else 0.0
+        track.sure[attribute] = max(before, sure[attribute])
     track.states.update(read)
     track.shown_m2 = max(track.shown_m2, area_m2)
     for sighting in sorted(sightings, key=lambda s: s.cloud.pixels):
@@ -115,18 +126,47 @@ def take_states(
         track.look = track.look if sighting.look is None else sighting.look
 
 
-def through_a_gap(read: Mapping[str, str], track: Track) -> dict[str, str]:
-    """What is believed of what was read off a sliver of a thing: it confirms, and settles nothing.
+def contradicting(read: Mapping[str, str], track: Track, may: Collection[str]) -> dict[str, str]:
+    """What is believed of what was read off a glimpse: it confirms, and settles nothing.
 
     What it contradicts is unobserved from now on, and presumed to be as it was believed to be: the
     rim of a mug behind the edge of a sink is no judge of what is in it.
+
+    Args:
+        read: attribute → value.
+        track: of the thing; changed.
+        may: attributes that may be contradicted.
     """
-    believed = {**track.presumed, **{a: v for a, v in track.states.items() if v is not None}}
-    for attribute, value in read.items():
-        if believed.get(attribute, value) != value:
-            track.states.pop(attribute, None)
-            track.presumed[attribute] = believed[attribute]
-    return {a: v for a, v in read.items() if believed.get(a, v) == v}
+    believed = believed_of(track)
+    denied = {a for a, v in read.items() if a not in may and believed.get(a, v) != v}
+    for attribute in denied:
+        track.states.pop(attribute, None)
+        track.presumed[attribute] = believed[attribute]
+    return {a: v for a, v in read.items() if a not in denied}
+
+
+def believed_of(track: Track) -> dict[str, str]:
+    """The states of a thing as they were read last, else as they are presumed to be."""
+    return {**track.presumed, **{a: v for a, v in track.states.items() if v is not None}}
+
+
+def outweighing(
+    read: Mapping[str, str], sure: Mapping[str, float], track: Track, config: PerceptionConfig
+) -> set[str]:
+    """Attributes of which a reading outweighs what was believed, by Bayes' rule.
+
+    What was read a moment ago, or what a skill should have made of it, is so with `steady` times
+    the probability that it was read with; the rest is left for what changed unseen and for skills
+    that failed. What a look then makes less likely than `outweighs` it does not settle.
+    """
+    found = set()
+    for attribute in read:
+        before = config.steady * track.sure.get(attribute, 1.0)
+        now = sure[attribute]
+        against, supported = (1.0 - now) * before, now * (1.0 - before)
+        if supported >= config.outweighs * (supported + against):
+            found.add(attribute)
+    return found
 
 
 def in_hand(

@@ -26,6 +26,7 @@ class Track:
     `look` is its mean colour, (3,) from 0 to 1, where perception has to tell things apart itself.
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
     view that showed it showed it where it was before, `vague` that it was seen and never located,
+    `sure` how sure a state was when it was read, 1 where nobody says,
     `presumed` what skills should have made of states since they were read. `sightings` counts the
     views that showed it, `shown_m2` is the largest area that one of them showed, `doubted` is
     another category that a single view of the newest observation called it, `shown` the cells of
@@ -44,6 +45,7 @@ class Track:
     first_seen_s: float = 0.0
     last_seen_s: float = 0.0
     states: dict[str, str | None] = field(default_factory=dict)
+    sure: dict[str, float] = field(default_factory=dict)
     presumed: dict[str, str] = field(default_factory=dict)
     feature: bytes | None = None
     look: Points | None = None
@@ -63,6 +65,12 @@ class Track:
             self.high_m = self.high_m + offset_m
             self.centroid_m = self.centroid_m + offset_m
 
+    def remember(self, other: Track) -> None:
+        """Take over what was read of the states under another name and is not read anew."""
+        known = {a: v for a, v in other.states.items() if v is not None}
+        self.sure = {**{a: other.sure.get(a, 1.0) for a in known}, **self.sure}
+        self.states = {**known, **self.states}
+
     def lose(self) -> None:
         """Forget where it is."""
         self.points_world_m = None
@@ -73,6 +81,7 @@ class Track:
 class View:
     """One frame with what was found in it; everything but the frame and `labels` by label.
 
+    `sure` are the probabilities of the states that were read, where the estimator says any.
     `features` are None without an image encoder and for what has no cloud. `unlocated` tells what
     is seen and has no place, because no depth returned or the segmenter is not sure of its mask.
     `guessed` are the ids that perception gave, and no segmenter that tracks. `looks` are mean
@@ -85,6 +94,7 @@ class View:
     categories: tuple[str, ...]
     clouds: tuple[Cloud | None, ...]
     states: tuple[Mapping[str, str | None], ...]
+    sure: tuple[Mapping[str, float], ...]
     features: tuple[bytes | None, ...]
     unlocated: tuple[bool, ...]
     guessed: frozenset[str] = frozenset()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -63,6 +63,19 @@ class StateEstimator(Protocol):
         self, frame: Frame, detections: Sequence[Detection]
     ) -> Sequence[Mapping[str, str | None]]:
         """For each detection: attribute → value, None where it cannot be told."""
+
+
+@runtime_checkable
+class ConfidentStateEstimator(StateEstimator, Protocol):
+    """One that also says how sure it is, so that a doubtful look does not undo a sure one."""
+
+    def estimate_with_confidence(
+        self, frame: Frame, detections: Sequence[Detection]
+    ) -> Sequence[tuple[Mapping[str, str | None], Mapping[str, float]]]:
+        """For each detection: as `estimate`, and attribute → probability of the value told.
+
+        Probabilities are calibrated, in [0, 1]; an attribute without one is as sure as can be.
+        """
 
 
 class Perceiver(Protocol):
