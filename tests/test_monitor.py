@@ -102,6 +102,24 @@ def started(*answers: StrategyAnswer, **config: object) -> tuple[Monitor, Script
     return monitor, strategy
 
 
+def test_what_was_to_be_cut_is_looked_at_before_anything_is_believed_of_it() -> None:
+    """Whether a skill has made other things of one shows where it was, and nowhere else."""
+    monitor, _ = started()
+    plan = Plan.parse(["slice_obj(Bread)", "put_on(Knife, CounterTop)"], "bread to be toasted")
+    more = (node("Knife-1", 3.0), node("Bread-1", 5.0), node("CounterTop-1"))
+    held = (Relation("Knife-1", "held_by", GRIPPER),)
+    there = replace(scene(), nodes=(*scene().nodes, *more), relations=held)
+    monitor.start(plan)
+    monitor.before(there)
+    bread, counter = there.get("Bread-1"), there.get("CounterTop-1")
+    assert bread is not None and counter is not None
+    monitor.after(replace(DONE, hand_world_m=None))
+    assert monitor.wanted_views() == (bread.centroid_m, counter.centroid_m)
+    monitor.before(there)
+    monitor.after(replace(DONE, hand_world_m=(0.0, 0.0, 1.0)))
+    assert monitor.wanted_views() == ((0.0, 0.0, 1.0), counter.centroid_m), "and once only"
+
+
 def test_a_run_by_hand_from_graphs_alone() -> None:
     monitor, strategy = started()
     monitor.observe(scene())

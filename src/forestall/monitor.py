@@ -318,7 +318,7 @@ class Monitor:
         return None if run.finished else run.command(run.ground(), run.position)
 
     def wanted_views(self) -> tuple[Vec3, ...]:
-        """World points to look at: where the hand let go last, the arguments that it does not hold.
+        """World points to look at: where the hand worked last, the arguments that it does not hold.
 
         Of the next subtask; of the last one while a look after it is asked for, and at the end.
         """

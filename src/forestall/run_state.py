@@ -91,7 +91,8 @@ class RunState:
         fruitless: how often in a row a subtask came to nothing.
         graph: everything that is believed.
         robot_world_m: where the robot stands.
-        worked_at: where the hand let go last.
+        worked_at: where the newest skill let go, and where it was to make other things of one:
+            nobody knows what is there before it is seen.
         time_s: of the robot's clock.
         streaks: what has gone wrong in a row.
         seconds: measured time by phase; `since` is the same when the boundary began.
@@ -116,7 +117,7 @@ class RunState:
     graph: SceneGraph = field(default_factory=lambda: SceneGraph(()))
     final: SceneGraph | None = None
     robot_world_m: Vec3 = (0.0, 0.0, 0.0)
-    worked_at: Vec3 | None = None
+    worked_at: tuple[Vec3, ...] = ()
     time_s: float = 0.0
     streaks: Streaks = field(default_factory=Streaks)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -167,8 +168,8 @@ class RunState:
         return executable(subtask, self.plan.subtasks[position], self.domain)
 
     def views(self, subtask: Subtask) -> tuple[Vec3, ...]:
-        """Where the hand let go last, and the arguments that it does not hold."""
-        points: list[Vec3] = [] if self.worked_at is None else [self.worked_at]
+        """Where the hand worked last, and the arguments that it does not hold."""
+        points = list(self.worked_at)
         held = self.graph.in_hands(self.domain.robot.hands)
         for name in subtask.args:
             node = self.graph.get(name)
@@ -239,8 +240,8 @@ class RunState:
             self.bound.clear()
             known = around(self.last.graph, subtask, self.domain)
             self.refusals.append(Refusal(subtask, outcome.reason, known))
-        self.worked_at = outcome.hand_world_m
         command = self.command(subtask, self.position)
+        self.worked_at = self._worked_at(command, outcome)
         self.executed.append(ExecutedRecord(command, outcome, self.boundary - 1))
         self.position += 1
         self.ready = False
@@ -250,6 +251,17 @@ class RunState:
         if outcome.status is SkillStatus.SUCCEEDED:
             self.acted = subtask
             self.senses.done(bool(self.domain.skill(command.skill).effects))
+
+    def _worked_at(self, command: Subtask, outcome: SkillOutcome) -> tuple[Vec3, ...]:
+        """See `worked_at`; of what is in the hand the views show that anyway."""
+        points = () if outcome.hand_world_m is None else (outcome.hand_world_m,)
+        skill = self.domain.skills.get(command.skill)
+        if skill is None or not skill.makes or self.last is None:
+            return points
+        known = map(self.last.graph.get, self.last.subtask.args)
+        held = self.last.graph.in_hands(self.domain.robot.hands)
+        at = (n.centroid_m for n in known if n is not None and n.id not in held)
+        return (*points, *(c for c in at if c is not None))
 
     def context(
         self,
