@@ -14,9 +14,10 @@ from forestall.replanning.searching import with_shutting, without
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.graph import SceneGraph
 from forestall.types.symbolic import scene_graph
-from forestall.types.verdict import Diagnosis, Reference
+from forestall.types.verdict import Diagnosis, Reference, Replan
 from planning import episodes
-from planning.corpus import PLANS
+from planning.corpus import PLANS, home_of
+from planning.corpus import scene as stated
 from planning.playing import begun, played
 
 DOMAIN = shipped("household")
@@ -204,6 +205,30 @@ def test_what_is_in_sight_is_not_looked_for() -> None:
     wanted = (Literal.parse("located(Egg)"), Literal.parse("open(Fridge-1)=open"))
     assert sought(wanted, graph("Fridge-1")) == ("Egg",)
     assert sought(wanted, graph("Fridge-1", "Egg-3")) == ()
+
+
+def test_what_can_be_made_is_made_before_it_is_looked_for() -> None:
+    """A cut that came to nothing: the bread lies there whole, and no slice is anywhere."""
+    shut = "Cabinet-1 hidden, Drawer-1 hidden, Knife-1 held"
+    whole = stated(home_of("toast-bread"), shut)
+    wanted = Diagnosis("no slice", (Literal.parse("located(BreadSliced)"),))
+    replanner = PlannerReplanner(GraphValidator(DOMAIN), DOMAIN)
+
+    def answer(seen: SceneGraph) -> Replan:
+        at = PLANS["toast-bread"].texts().index("put_on(Knife, CounterTop)")
+        return replanner.replan(
+            episodes.context("toast-bread", PLANS["toast-bread"], at, seen), wanted
+        )
+
+    made = answer(whole)
+    assert made.looking_for == () and made.plan is not None
+    assert "slice_obj(Bread-1)" in made.plan.texts()
+    nowhere = replace(
+        whole,
+        nodes=tuple(n for n in whole.nodes if n.category != "Bread"),
+        relations=tuple(r for r in whole.relations if not r.subject.startswith("Bread-")),
+    )
+    assert answer(nowhere).looking_for == ("BreadSliced",), "it may have been cut"
 
 
 def play(kitchen: Kitchen) -> Monitor:

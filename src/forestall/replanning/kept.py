@@ -1,4 +1,4 @@
-"""What a repair keeps besides what it is for: the hand, what must not be spoiled, what is off.
+"""What a repair keeps: the hand, what must not be spoiled, what is off, the rest of the plan.
 
 Called by the replanner; calls the planner's state.
 """
@@ -13,6 +13,8 @@ from forestall.planning.planner import Planned
 from forestall.planning.state import State
 from forestall.planning.validate import unsupported
 from forestall.types.facts import Literal, category_of
+from forestall.types.plan import Subtask
+from forestall.types.runtime import BoundaryContext
 from forestall.types.task import Goal
 
 
@@ -98,3 +100,27 @@ def _running(domain: Domain) -> list[tuple[str, str]]:
             if literal.value != known.values[0]:
                 found[literal.predicate, literal.value] = None
     return list(found)
+
+
+def rests_of(
+    context: BoundaryContext, state: State, repaired: bool
+) -> tuple[tuple[Subtask, ...], ...]:
+    """What is left of the current plan, with the drive that led to its first step.
+
+    First with categories of which there are several bound to the thing that the robot deals with
+    now, then as it stands.
+    """
+    rest = context.plan.subtasks[context.index :]
+    before = context.plan.subtasks[context.index - 1 : context.index] if context.index else ()
+    driving = state.domain.driving()
+    if repaired and before and driving is not None and before[0].skill == driving.name:
+        rest = (*before, *rest)
+    bound = {}
+    for name in (*context.subtask.args, *(h for _, h in state.in_hands())):
+        kind = state.kinds.get(name)
+        if kind is None or state.domain.is_a(kind, state.domain.roles.fixture):
+            continue
+        if len(state.instances(kind)) > 1:
+            bound[kind] = name
+    named = tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
+    return (named,) if named == rest else (named, rest)

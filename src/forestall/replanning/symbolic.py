@@ -26,9 +26,10 @@ from forestall.replanning.hidden import (
     hiding_places,
     in_vain,
     is_shut_place,
+    made_of_what_is_there,
     sought,
 )
-from forestall.replanning.kept import as_it_is, hand, left_running, unspoiled
+from forestall.replanning.kept import as_it_is, hand, left_running, rests_of, unspoiled
 from forestall.replanning.searching import as_usual, with_shutting, without
 from forestall.seams.judging import PlanValidator
 from forestall.types.facts import Literal
@@ -108,11 +109,24 @@ class PlannerReplanner:
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
         lost = sought(diagnosis.must_change, context.graph)
-        if lost:
+        if set(lost) - made_of_what_is_there(lost, context.graph, self.domain):
             search = self._search(attempts, context, lost, diagnosis.must_stay)
             if search is not None:
                 return search
             attempts.notes = in_vain(lost, diagnosis.must_stay, self.domain)
+        found = self._changed(attempts, context, diagnosis, lost)
+        if found.outcome is ReplanOutcome.SOLVED or not lost or attempts.notes:
+            return found
+        return self._search(attempts, context, lost, diagnosis.must_stay) or found
+
+    def _changed(
+        self,
+        attempts: _Attempts,
+        context: BoundaryContext,
+        diagnosis: Diagnosis,
+        lost: tuple[str, ...],
+    ) -> Replan:
+        """The plan in which what must change has changed; what is `lost` may have to be made."""
         wanted = [x for x in diagnosis.must_change if not unsupported((x,), self.domain)]
         if not wanted:
             names = ", ".join(map(str, diagnosis.must_change))
@@ -122,7 +136,7 @@ class PlannerReplanner:
         repairs: list[Planned] = []
         stay = [x for x in diagnosis.must_stay if not set(lost) & set(x.args)]
         for repair in self._repairs(attempts, state, context, wanted, stay):
-            rests = _rests(context, state, bool(repair.subtasks))
+            rests = rests_of(context, state, bool(repair.subtasks))
             if context.refused and repair.final and not unmet((repair.final,), context.task.goal):
                 rests = ((), *rests)  # what was wanted was all that is left to do
             for rest in rests:
@@ -357,30 +371,6 @@ class PlannerReplanner:
             time.perf_counter() - attempts.start_s,
             note,
         )
-
-
-def _rests(
-    context: BoundaryContext, state: State, repaired: bool
-) -> tuple[tuple[Subtask, ...], ...]:
-    """What is left of the current plan, with the drive that led to its first step.
-
-    First with categories of which there are several bound to the thing that the robot deals with
-    now, then as it stands.
-    """
-    rest = context.plan.subtasks[context.index :]
-    before = context.plan.subtasks[context.index - 1 : context.index] if context.index else ()
-    driving = state.domain.driving()
-    if repaired and before and driving is not None and before[0].skill == driving.name:
-        rest = (*before, *rest)
-    bound = {}
-    for name in (*context.subtask.args, *(h for _, h in state.in_hands())):
-        kind = state.kinds.get(name)
-        if kind is None or state.domain.is_a(kind, state.domain.roles.fixture):
-            continue
-        if len(state.instances(kind)) > 1:
-            bound[kind] = name
-    named = tuple(Subtask(s.skill, tuple(bound.get(a, a) for a in s.args)) for s in rest)
-    return (named,) if named == rest else (named, rest)
 
 
 def _stands_at(context: BoundaryContext) -> tuple[float, float] | None:
