@@ -252,6 +252,15 @@ def test_one_plan_too_many_is_a_hold() -> None:
     assert monitor.plan == PLAN
 
 
+def test_looking_for_something_uses_up_no_repair() -> None:
+    """There are only so many places to look into, and each is looked into once."""
+    assert REPLAN.replan is not None
+    search = replace(REPLAN, replan=replace(REPLAN.replan, looking_for=("Bowl",)))
+    monitor, _ = started(search, search, search, REPLAN, search, max_replans=1)
+    outcomes = [monitor.before(scene()).outcome for _ in range(5)]
+    assert outcomes == [Outcome.REPLAN] * 4 + [Outcome.HOLD]
+
+
 def test_a_strategy_that_stops_holds_the_robot() -> None:
     monitor, _ = started(StrategyAnswer(Decision.STOP, ALARM, WHY, why="no repair found"))
     decision = monitor.before(scene())

@@ -25,7 +25,8 @@ class MonitorConfig:
 
     Args:
         max_subtasks: how many subtasks may be executed.
-        max_replans: how many corrected plans may be adopted; asking for more is a "hold".
+        max_replans: how many corrected plans may be adopted; asking for more is a "hold". Plans
+            that look for something do not count: there are only so many places.
         max_looks: how many observations one boundary may take.
         on_not_judged: whether a subtask may start of which nothing was judged: there is no
             reference, an argument is not located, or the strategy does not judge here.
@@ -79,8 +80,9 @@ def conclude(
         return _held(decision, Hold.STOPPED, answer.why)
     plan = None if answer.replan is None else answer.replan.plan
     if answer.decision is Decision.REPLAN and plan is not None:
-        if context.replans >= config.max_replans:
-            why = f"{context.replans} plans were adopted, and no more may be: {answer.why}"
+        repairs = context.replans - context.searches
+        if repairs >= config.max_replans:
+            why = f"{repairs} corrected plans were adopted, and no more may be: {answer.why}"
             return _held(decision, Hold.REPLAN_LIMIT, why)
         return replace(decision, outcome=Outcome.REPLAN, may_start=False, plan=plan)
     if answer.decision is Decision.LOOK_AGAIN and context.may_look:

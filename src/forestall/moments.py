@@ -93,7 +93,8 @@ class Moments:
                 decision, outcome=Outcome.HOLD, may_start=False, plan=None, hold=hold, why=why
             )
         if decision.plan is not None:
-            run.adopt(decision.plan)
+            replan = decision.replan
+            run.adopt(decision.plan, replan is not None and bool(replan.looking_for))
         elif decision.outcome is Outcome.LOOK:
             return replace(decision, look_at=run.views(context.subtask))
         elif context.when is When.BEFORE:

@@ -79,7 +79,7 @@ class RunState:
         plan: the plan at hand.
         senses: whether what is seen can be so.
         position: in it, of the subtask that comes next.
-        replans: how many plans were adopted.
+        replans: how many plans were adopted, and `searches` how many of them look for something.
         looks: taken at the boundary that is open, 0 where none is.
         boundary: how many boundaries are over.
         ready: whether the newest subtask that was judged may be reported as executed.
@@ -105,6 +105,7 @@ class RunState:
     senses: Senses
     position: int = 0
     replans: int = 0
+    searches: int = 0
     looks: int = 0
     boundary: int = 0
     ready: bool = False
@@ -212,10 +213,11 @@ class RunState:
             f"next is {self.plan.subtasks[self.position]}"
         )
 
-    def adopt(self, plan: Plan) -> None:
-        """Go on with another plan."""
+    def adopt(self, plan: Plan, searching: bool) -> None:
+        """Go on with another plan; `searching`: it only looks for something."""
         self.plan, self.position = plan, 0
         self.replans += 1
+        self.searches += searching
 
     def close_boundary(self) -> None:
         """The next look is the first of another boundary."""
@@ -287,6 +289,7 @@ class RunState:
             looks=look,
             may_look=look < max_looks,
             replans=self.replans,
+            searches=self.searches,
             when=when,
             refused=tuple(self.refused()),
             vain=self.vain(),

@@ -61,7 +61,8 @@ class RuntimeConfig:
 
     Args:
         max_subtasks: how many subtasks may be executed.
-        max_replans: how many corrected plans may be adopted; asking for more ends the run.
+        max_replans: how many corrected plans may be adopted; asking for more ends the run. Plans
+            that look for something do not count: there are only so many places.
         max_looks: how many observations one boundary may take.
         keep_observations: whether pictures go into the record.
         final_look: whether to look once more when the plan is finished, also for a strategy that

@@ -50,6 +50,7 @@ class BoundaryContext:
         looks: how many times the robot looked at this boundary (1 at first).
         may_look: whether it may look once more.
         replans: how many plans were made in this episode so far.
+        searches: how many of them only look for something; each goes to another place.
         when: at which moment this is. After the subtask `index` is still its own, at the end of the
             plan it is the plan's length and `subtask` the last one.
         refused: ground subtasks that the robot refused, about whose arguments nothing has changed
@@ -72,6 +73,7 @@ class BoundaryContext:
     looks: int = 1
     may_look: bool = True
     replans: int = 0
+    searches: int = 0
     when: When = When.BEFORE
     refused: tuple[Subtask, ...] = ()
     vain: tuple[Subtask, ...] = ()
