@@ -1,8 +1,9 @@
 """What depth shows against gravity, the floor, the hand and the sizes of things.
 
-Called by `gate.py`; sizes are `gate_sizes.py`'s. Rooms are built level: most of their surfaces lie or stand. If they do so by
-another direction than by the stated "up", the pose, the axes or the focal length are wrong. Where
-it is near the stated one, the angle between the two is measured.
+Called by `gate.py`; sizes are judged in `gate_sizes.py`. Rooms are built level: most of their
+surfaces lie or stand. If they do so by another direction than by the stated "up", the pose, the
+axes or the focal length are wrong. Where it is near the stated one, the angle between the two is
+measured.
 """
 
 from __future__ import annotations
