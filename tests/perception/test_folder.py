@@ -595,10 +595,10 @@ def test_a_held_thing_that_is_nearly_of_a_category_is_doubted(
     assert "gripper.holding: " in said and "'Mgug': did you mean Mug?" in said
 
 
+@pytest.mark.parametrize("word", ["oscilloscope", "mug", "025_mug"])
 def test_what_is_far_from_every_category_is_no_slip(
-    folder: Path, caplog: pytest.LogCaptureFixture
+    folder: Path, word: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    for word in ("oscilloscope", "mug", "025_mug"):
-        edit(folder, lambda d, w=word: detection(d).update(category=w, instance="9", states={}))
-        read_observation(folder)
+    edit(folder, lambda d: detection(d).update(category=word, instance="9", states={}))
+    read_observation(folder)
     assert caplog.messages == []
