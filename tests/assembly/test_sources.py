@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from forestall.assembly.sources import demonstrations_from, written
+from forestall.assembly.sources import demonstrations_from, gathered, written
 from forestall.errors import FileFormatError, InputError
 from forestall.memory.store import open_store
 from forestall.types.graph import SceneGraph
@@ -46,7 +47,7 @@ def test_a_mixture_of_files_folders_and_lists(tmp_path: Path) -> None:
     steps = [{"subtask": "grasp(peg-1)", "scene": scene()}]
     (folder / "a.json").write_text(json.dumps({"task": "t", "steps": steps}))
     named = [{"subtask": "grasp(peg-1)", "scene": "scenes/one.json"}]
-    (folder / "b.json").write_text(json.dumps({"task": "t", "steps": named}))
+    (folder / "b.json").write_text(json.dumps({"task": "u", "steps": named}))
     (folder / "scenes").mkdir()
     (folder / "scenes" / "one.json").write_text(json.dumps(scene()))
     graph = demonstrations_from(TWELVE[3])[0].steps[0].graph
@@ -54,9 +55,25 @@ def test_a_mixture_of_files_folders_and_lists(tmp_path: Path) -> None:
     (folder / "notes.txt").write_text("not a demonstration")
     found = demonstrations_from([tmp_path / "memory.db", str(folder), TWELVE[4]])
     assert len(found) == 3 + 3 + 1
-    assert [d.task for d in found[3:5]] == ["t", "t"]
+    assert [d.task for d in found[3:5]] == ["t", "u"]
     assert found[3].steps[0].graph == found[4].steps[0].graph
     assert found[5].steps[0].graph == graph
+
+
+def test_the_same_in_several_files_is_one_and_a_different_one_of_its_name_has_a_number(
+    tmp_path: Path,
+) -> None:
+    steps = [{"subtask": "grasp(peg-1)", "scene": scene()}]
+    for name in ("a.json", "b.json"):
+        (tmp_path / name).write_text(json.dumps({"task": "t", "steps": steps}))
+    (one,), repeated = gathered([tmp_path / "a.json", tmp_path / "a.json", tmp_path / "b.json"])
+    assert repeated == 2
+    with open_store(tmp_path / "memory.db", create=True) as store:
+        store.add(one)
+    assert demonstrations_from([tmp_path, tmp_path / "memory.db"]) == [one]
+    other = replace(demonstrations_from(TWELVE[0])[0], id=one.id)
+    found, repeated = gathered([one, other, one, other])
+    assert [d.id for d in found] == [one.id, f"{one.id}-2"] and repeated == 2
 
 
 BAD: list[tuple[Any, str]] = [

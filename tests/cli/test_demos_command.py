@@ -33,6 +33,44 @@ def test_one_label_is_enough_for_an_alarm(
     assert "hole-1 is dirty; it was clean in the only demonstration there is" in str(alarm)
 
 
+def test_what_is_equal_is_added_once_in_one_command_as_over_several(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steps = [{"subtask": INSERT, "scene": scene("hand")}]
+    files = [tmp_path / "a.json", tmp_path / "b.json"]
+    files[0].write_text(json.dumps({"task": "t", "steps": steps}), encoding="utf-8")
+    files[1].write_text(json.dumps({"task": "other", "steps": steps}), encoding="utf-8")
+    memory, several = tmp_path / "one.db", tmp_path / "several.db"
+
+    def add(to: Path, *sources: Path) -> str:
+        assert call(["demos", "add", str(to), *map(str, sources)]) == 0
+        return capsys.readouterr().out
+
+    assert add(memory, files[0], files[0]) == (
+        f"1 demonstrations added to {memory}, 1 were there already\n"
+    )
+    assert add(several, files[0]) == f"1 demonstrations added to {several}\n"
+    assert add(several, files[0]).startswith("0 demonstrations added")
+    assert add(memory, tmp_path) == f"1 demonstrations added to {memory}, 3 were there already\n"
+    with open_store(memory) as store, open_store(several) as other:
+        first, second = store.required()
+        assert {first.task, second.task} == {"t", "other"}
+        assert list(other.required()) == [d for d in (first, second) if d.task == "t"]
+
+
+def test_repeats_in_a_memory_are_copied_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_store(tmp_path / "twelve.db", create=True) as store:
+        for demonstration in demonstrations_from(TWELVE):
+            store.add(demonstration)
+        assert len(store) == 12
+    memory = tmp_path / "memory.db"
+    assert call(["demos", "add", str(memory), str(tmp_path / "twelve.db")]) == 0
+    assert "3 demonstrations added" in (out := capsys.readouterr().out)
+    assert "9 were there already" in out
+
+
 def test_a_label_may_be_a_scene_with_more_said_beside_it(tmp_path: Path) -> None:
     (tmp_path / "scene.json").write_text(json.dumps(scene("hand", hole=None)), encoding="utf-8")
     memory = tmp_path / "memory.db"

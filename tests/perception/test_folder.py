@@ -14,7 +14,6 @@ from forestall.errors import (
     FileFormatError,
     ObservationError,
     PerceptionError,
-    UnknownNameError,
 )
 from forestall.perception.folder import read_observation, write_observation
 from forestall.perception.given import GivenStateEstimator
@@ -135,13 +134,46 @@ JSON_FAULTS = {
         FileFormatError,
         "is not a Plate",
     ),
-    "attribute": (lambda d: detection(d).update(states={"open": "open"}), UnknownNameError, "open"),
+    "attribute": (
+        lambda d: detection(d).update(states={"dirtyy": "clean"}),
+        FileFormatError,
+        r"observation.json: frames.0.detections.1: states: .*'dirtyy': did you mean dirty",
+    ),
     "value": (
         lambda d: detection(d).update(states={"dirty": "filthy"}),
-        UnknownNameError,
-        "clean",
+        FileFormatError,
+        r"observation.json: frames.0.detections.1: states: unknown value of dirty 'filthy'.*clean",
     ),
-    "empty mask": (lambda d: detection(d).update(id=77), FileFormatError, "empty"),
+    "id that no pixel has": (
+        lambda d: detection(d).update(id=77),
+        FileFormatError,
+        r"detections.1: .*masks.png has no pixel with the id 77; it has 1, 2, 3$",
+    ),
+    "misspelt category beside an instance": (
+        lambda d: detection(d).update(category="Plaet"),
+        FileFormatError,
+        r"detections.1: instance 'Plate-1' is not a Plaet: .*no category 'Plaet', .*mean Plate\?",
+    ),
+    "three rows": (
+        lambda d: d["frames"][0]["camera_to_world"].pop(),
+        FileFormatError,
+        "frames.0.camera_to_world: a 4 x 4 matrix is wanted.*this has 3 rows of 4",
+    ),
+    "rows of three": (
+        lambda d: [row.pop() for row in d["frames"][0]["camera_to_world"]],
+        FileFormatError,
+        "this has 4 rows of 3",
+    ),
+    "a matrix in one row": (
+        lambda d: d["frames"][0].update(camera_to_world=[1.0] * 16),
+        FileFormatError,
+        "a 4 x 4 matrix is wanted.*this is no list of rows",
+    ),
+    "a place of two numbers": (
+        lambda d: d["gripper"].update(position_m=[1.0, 2.0]),
+        FileFormatError,
+        r"gripper.position_m: a place is wanted, three numbers \[x, y, z\] in metres",
+    ),
     "neither id nor mask": (lambda d: detection(d).pop("id"), FileFormatError, "either"),
     "missing mask file": (
         lambda d: (detection(d).pop("id"), detection(d).update(mask="no.png")),
@@ -536,3 +568,37 @@ def test_categories_are_in_the_users_words(folder: Path, kind: str) -> None:
 def test_what_is_held_has_an_id_of_any_form(folder: Path) -> None:
     edit(folder, lambda d: d["gripper"].update(holding="coffee mug|+0.1|+2.0"))
     assert read_observation(folder)[0].gripper.holding == "Mug-1"
+
+
+@pytest.mark.parametrize("word", ["Plaet", "plaet", "potatoe"])
+def test_a_word_that_is_nearly_a_category_is_doubted_and_taken(
+    folder: Path, word: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    near = "Potato" if word == "potatoe" else "Plate"
+    edit(folder, lambda d: detection(d).update(category=word, instance="9", states={}))
+    observation, _ = read_observation(folder)
+    assert (observation.frames[0].detections or ())[1].category == word
+    (said,) = caplog.messages
+    assert (
+        f"observation.json: frames.0.detections.1: the domain household has no category {word!r}"
+        in (said)
+    )
+    assert f"did you mean {near}?" in said
+
+
+def test_a_held_thing_that_is_nearly_of_a_category_is_doubted(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    edit(folder, lambda d: d["gripper"].update(holding="Mgug-1"))
+    assert read_observation(folder)[0].gripper.holding == "Mgug-1"
+    (said,) = caplog.messages
+    assert "gripper.holding: " in said and "'Mgug': did you mean Mug?" in said
+
+
+@pytest.mark.parametrize("word", ["oscilloscope", "mug", "025_mug"])
+def test_what_is_far_from_every_category_is_no_slip(
+    folder: Path, word: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    edit(folder, lambda d: detection(d).update(category=word, instance="9", states={}))
+    read_observation(folder)
+    assert caplog.messages == []

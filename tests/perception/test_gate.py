@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 from forestall.errors import InputError, ObservationError
 from forestall.perception.gate import inspect
 from forestall.perception.gate_config import GateConfig
@@ -187,6 +188,82 @@ def test_sizes_of_things_tell_the_scale_without_a_floor() -> None:
     alone = observed(table[:2], looking((0.0, -0.3, 1.3), (0.0, 0.4, 0.75)))
     assert refused(alone) == set()
     assert "sizes" in refused(depth(lambda z: z * 4)(alone))
+
+
+TABLE_M = 0.74
+LABORATORY = [
+    Solid("DiningTable-1", (-2.0, 0.0, 0.0), (2.0, 0.8, TABLE_M)),
+    at("Mug-1", 0.0, 0.3, TABLE_M, (0.085, 0.085, 0.1), True),
+    at("Plate-1", -0.3, 0.4, TABLE_M, (0.22, 0.22, 0.025), True),
+    at("Pot-1", 0.3, 0.4, TABLE_M, (0.2, 0.2, 0.13), True),
+]
+OVER_IT = looking((0.0, -0.3, 1.4), (0.0, 0.4, 0.75))
+
+
+def with_size(category: str, size_m: tuple[float, float, float]) -> Domain:
+    known = replace(HOUSEHOLD[category], size_m=size_m)
+    return replace(HOUSEHOLD, categories={**HOUSEHOLD.categories, category: known})
+
+
+STATED = with_size("DiningTable", (4.0, 0.8, TABLE_M))
+
+
+def refused_by(domain: Domain, seen: Observation, factor: float) -> set[str]:
+    found = inspect(depth(lambda z: z * factor)(seen), domain)
+    return {f.what for f in found if f.refuses}
+
+
+@pytest.mark.parametrize("factor", [0.1, 0.2, 0.3, 0.45])
+def test_a_table_that_the_border_cuts_does_not_hide_that_all_else_is_too_small(
+    factor: float,
+) -> None:
+    seen = observed(LABORATORY, OVER_IT)
+    for domain in (HOUSEHOLD, STATED):
+        assert refused_by(domain, seen, 1.0) == set()
+        assert refused_by(domain, seen, factor) == {"sizes"}
+
+
+@pytest.mark.parametrize("factor", [0.6, 0.65, 0.7, 1.4, 1.6])
+def test_a_stated_height_of_furniture_tells_less_wrong_depth(factor: float) -> None:
+    seen = observed(LABORATORY, OVER_IT)
+    assert refused_by(STATED, seen, factor) == {"sizes"}
+    assert refused_by(HOUSEHOLD, seen, factor) == set(), "nobody says how high the table is"
+    (finding,) = inspect(depth(lambda z: z * factor)(seen), STATED)
+    assert f"depth is {factor:.2g} times what it is" in finding.sentence
+
+
+@pytest.mark.parametrize("height_m", [0.55, 0.95])
+def test_a_table_of_another_height_alone_is_no_reason(height_m: float) -> None:
+    moved = [s.moved((0.0, 0.0, height_m - TABLE_M)) for s in LABORATORY]
+    assert refused_by(STATED, observed(moved, OVER_IT), 1.0) == set()
+
+
+def test_small_things_on_a_table_of_the_stated_height_are_no_reason() -> None:
+    toys = [
+        LABORATORY[0],
+        at("Mug-1", 0.0, 0.3, TABLE_M, (0.055, 0.055, 0.065), True),
+        at("Plate-1", -0.3, 0.4, TABLE_M, (0.14, 0.14, 0.015), True),
+    ]
+    assert refused_by(STATED, observed(toys, OVER_IT), 1.0) == set()
+
+
+def test_what_something_stands_before_is_not_too_small() -> None:
+    behind = [
+        LABORATORY[0],
+        at("Plate-1", 0.0, 0.5, TABLE_M, (0.22, 0.22, 0.2)),
+        at("Bottle-1", 0.0, 0.35, TABLE_M, (0.2, 0.02, 0.3)),
+    ]
+    low = looking((0.0, -0.5, 0.9), (0.0, 0.4, 0.85))
+    domain = with_size("Plate", (0.9, 0.9, 0.3))
+    assert "sizes" not in refused_by(domain, observed(behind, low), 1.0)
+    assert "sizes" in refused_by(domain, observed(behind[:2], low), 1.0), "its size is wrong"
+
+
+def test_a_thing_that_the_border_cuts_does_not_hide_that_all_else_is_too_large() -> None:
+    slice_of_a_plate = at("Plate-2", 0.8, 0.4, TABLE_M, (0.22, 0.22, 0.025), True)
+    seen = observed([*LABORATORY, slice_of_a_plate], OVER_IT)
+    assert refused_by(HOUSEHOLD, seen, 1.0) == set()
+    assert refused_by(HOUSEHOLD, seen, 2.0) == {"sizes"}
 
 
 def tilted(observation: Observation, degrees: float, axis: int) -> Observation:

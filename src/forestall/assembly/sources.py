@@ -51,7 +51,18 @@ def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demons
         eyes: see scenes that are pictures; without them these are refused.
 
     Returns:
-        Demonstrations with ids that differ, in the order of the source.
+        Demonstrations with ids that differ, in the order of the source. Of the same one in several
+        files there is one; equal ones that are given in Python are as many as are given.
+
+    Raises:
+        InputError: something that is no demonstration, with its place.
+        MemoryFileError: see `memory.store`.
+    """
+    return gathered(source, eyes)[0]
+
+
+def gathered(source: Source, eyes: Eyes | None = None) -> tuple[list[Demonstration], int]:
+    """Like `demonstrations_from`, and how many were left out because they were there already.
 
     Raises:
         InputError: something that is no demonstration, with its place.
@@ -60,7 +71,8 @@ def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demons
     found = _from(source, eyes)
     if not found:
         raise InputError(f"no demonstration was found in {_said(source)}")
-    return _named(found)
+    named = _named(found)
+    return named, len(found) - len(named)
 
 
 def scoped(
@@ -244,11 +256,12 @@ def _from_json(path: Path, eyes: Eyes | None) -> Demonstration:
     data = read_json(path, "demonstration")
     try:
         if isinstance(data, dict) and "steps" in data:
-            return written(data, path.parent, eyes)
+            return _identified(written(data, path.parent, eyes))
         if isinstance(data, dict) and data.get("subtask"):
             graph = scene_graph(data)
             assert graph.subtask is not None, "its text is not empty"
-            return written({"steps": [{"subtask": str(graph.subtask), "scene": graph}]})
+            steps = [{"subtask": str(graph.subtask), "scene": graph}]
+            return _identified(written({"steps": steps}))
         raise InputError("neither a demonstration with 'steps' nor a graph with its 'subtask'")
     except ForestallError as error:
         raise FileFormatError(f"{path}: {error}") from error
@@ -318,18 +331,32 @@ def _step(
 
 
 def _named(found: Iterable[Demonstration]) -> list[Demonstration]:
-    """With ids, which those lack that somebody wrote; equal ones are told apart by number."""
-    used: set[str] = set()
-    named = []
+    """With ids, which those lack that somebody wrote in Python, and which are told apart by number.
+
+    Of those that have the same id and the same content there is one.
+    """
+    used: dict[str, Demonstration] = {}
     for d in found:
-        name = d.id or f"{d.task or 'written'}-{encode(d).digest[:12]}"
+        name = d.id or _content_name(d)
         number, own = 1, name
-        while own in used:
+        while own in used and not (d.id and _same(used[own], d)):
             number += 1
             own = f"{name}-{number}"
-        used.add(own)
-        named.append(replace(d, id=own))
-    return named
+        used.setdefault(own, replace(d, id=own))
+    return list(used.values())
+
+
+def _identified(d: Demonstration) -> Demonstration:
+    """With the id of its content: a file says the same however often it is read."""
+    return replace(d, id=_content_name(d))
+
+
+def _content_name(d: Demonstration) -> str:
+    return f"{d.task or 'written'}-{encode(d).digest[:12]}"
+
+
+def _same(one: Demonstration, other: Demonstration) -> bool:
+    return encode(one).digest == encode(other).digest
 
 
 def _said(source: Source) -> str:

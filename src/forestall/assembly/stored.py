@@ -76,7 +76,6 @@ def read_scene(
     Raises:
         FileFormatError: a file is missing, cannot be read as what it should be, or says of things
             what means nothing in the domain.
-        UnknownNameError: a state in an observation folder that is not in the domain.
         ObservationError: what was seen cannot be.
     """
     if not is_graph(path):

@@ -85,7 +85,7 @@ def record(
 
 @demos.command
 def add(memory: Path, /, *sources: Path, parts: SeeingFlags = DEFAULTS) -> int:
-    """Keep what shows a successful run as demonstrations.
+    """Keep what shows a successful run as demonstrations; what is equal in content is kept once.
 
     Args:
         memory: the demonstration file to add to; made when it does not exist.
@@ -96,13 +96,13 @@ def add(memory: Path, /, *sources: Path, parts: SeeingFlags = DEFAULTS) -> int:
         parts: what pictures are seen with; they need --domain.
     """
     from forestall.assembly.eyes import eyes_for
-    from forestall.assembly.sources import demonstrations_from
+    from forestall.assembly.sources import gathered
     from forestall.errors import InputError
 
     if not sources:
         raise InputError("no source was named: give the folder of at least one run, or a file")
     eyes = None if parts.domain is None else eyes_for(parts.given())
-    return _kept(memory, demonstrations_from(sources, eyes))
+    return _kept(memory, *gathered(sources, eyes))
 
 
 @demos.command
@@ -180,15 +180,19 @@ def label(
     return _kept(memory, [labelled(subtask, scene, fact or (), task)])
 
 
-def _kept(memory: Path, found: Sequence[Demonstration]) -> int:
+def _kept(memory: Path, found: Sequence[Demonstration], there: int = 0) -> int:
+    """Add demonstrations and say how many; `there` were left out before as there already."""
     from forestall.memory.store import open_store
 
+    added = 0
     with open_store(memory, create=True) as store:
-        before = len(store)
         for demonstration in found:
+            if store.holds(demonstration):
+                there += 1
+                continue
             store.add(demonstration)
-        added = len(store) - before
-    known = f", {len(found) - added} were there already" if added < len(found) else ""
+            added += 1
+    known = f", {there} were there already" if there else ""
     print(f"{added} demonstrations added to {memory}{known}")
     return 0
 

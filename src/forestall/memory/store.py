@@ -136,6 +136,14 @@ class SqliteStore:
                 )
         return name
 
+    def holds(self, demonstration: Demonstration) -> bool:
+        """Whether one with the same content is there, under whatever id."""
+        with self._errors():
+            row = self._connection.execute(
+                "SELECT 1 FROM demonstrations WHERE digest = ?", (encode(demonstration).digest,)
+            ).fetchone()
+        return row is not None
+
     def recorded(self) -> frozenset[str]:
         """The jobs whose demonstrations are there."""
         with self._errors():

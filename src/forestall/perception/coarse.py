@@ -21,6 +21,13 @@ Flags = npt.NDArray[np.bool_]
 
 _STEEP = 0.08  # step to a neighbour, as a share of the distance, over which there is no surface
 
+_NEIGHBOURS = (
+    (np.s_[1:], np.s_[:-1]),
+    (np.s_[:-1], np.s_[1:]),
+    (np.s_[:, 1:], np.s_[:, :-1]),
+    (np.s_[:, :-1], np.s_[:, 1:]),
+)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Masks:
@@ -142,6 +149,34 @@ class Coarse:
         """(h, w) where one mask has depth."""
         cells: Flags = (self.labels == label) & self.known
         return cells
+
+    def lying(self, label: int, level: float) -> Points:
+        """(n, 3) points of one mask where its surface lies level and is seen from above.
+
+        Args:
+            label: of the mask.
+            level: least cosine of its direction to the vertical.
+        """
+        normal, smooth = self._surface
+        mine = smooth & (self.labels[1:-1, 1:-1] == label) & (normal[..., 2] > level)
+        found: Points = self.points_world_m[1:-1, 1:-1][mine]
+        return found
+
+    def covered(self, label: int, step: float) -> float:
+        """Share of the outline of one mask that borders on something before it.
+
+        Args:
+            label: of the mask.
+            step: how much nearer that is, as a share of the distance.
+        """
+        mask, z = self.labels == label, self.depth_m
+        outline = hidden = 0
+        for here, beside in _NEIGHBOURS:
+            edge = mask[here] & ~mask[beside]
+            both = edge & self.known[here] & self.known[beside]
+            outline += int(edge.sum())
+            hidden += int((both & (z[here] - z[beside] > step * z[here])).sum())
+        return hidden / outline if outline else 0.0
 
     def cut(self, label: int) -> bool:
         """Whether a mask reaches the border of the picture."""

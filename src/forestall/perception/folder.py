@@ -8,6 +8,7 @@ would be valid; what files that are in order cannot say together is for `gate.py
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,7 +20,7 @@ from forestall.config import DEFAULT_DOMAIN
 from forestall.domain.load import shipped
 from forestall.domain.model import Domain
 from forestall.domain.words import Names, stated
-from forestall.errors import FileFormatError, InputError, PerceptionError, UnknownNameError
+from forestall.errors import FileFormatError, InputError, PerceptionError
 from forestall.perception.conventions import (
     CameraAxes,
     DepthKind,
@@ -29,6 +30,7 @@ from forestall.perception.conventions import (
     place,
     z_depth,
 )
+from forestall.perception.folder_fields import Place, Pose, nearest
 from forestall.perception.folder_files import MaskFile, read_depth, read_rgb, single_mask
 from forestall.perception.folder_out import (
     OBSERVATION_FILE,
@@ -49,13 +51,14 @@ from forestall.types.observation import (
     Intrinsics,
     Mask,
     Observation,
+    Vec3,
 )
 
 _GATE = GateConfig()
 
+_log = logging.getLogger("forestall")
+
 GivenStates = dict[str, dict[str, str]]
-_Vec3 = tuple[float, float, float]
-_Row = tuple[float, float, float, float]
 
 
 class _Strict(BaseModel):
@@ -97,7 +100,7 @@ class _Conventions(_Strict):
 
 class _Frame(_Conventions):
     intrinsics: _Camera
-    camera_to_world: tuple[_Row, _Row, _Row, _Row]
+    camera_to_world: Pose
     rgb: str = "rgb.png"
     depth: str | None = None
     masks: str | None = None
@@ -107,9 +110,9 @@ class _Frame(_Conventions):
 class _Gripper(_Strict):
     name: str = GRIPPER
     holding: str | None
-    position_m: _Vec3
+    position_m: Place
     released: str | None = None
-    released_m: _Vec3 | None = None
+    released_m: Place | None = None
     width_m: float | None = None
     told: bool = True
 
@@ -120,8 +123,8 @@ class _Document(_Conventions):
     time_s: float = 0.0
     gripper: _Gripper
     other_hands: list[_Gripper] = []
-    named: dict[str, _Vec3] = {}
-    robot_position_m: _Vec3 | None = None
+    named: dict[str, Place] = {}
+    robot_position_m: Place | None = None
     frames: list[_Frame] = Field(min_length=1)
 
 
@@ -135,17 +138,19 @@ def read_observation(
 ) -> tuple[Observation, Mapping[str, Mapping[str, str]]]:
     """Read a stored observation and the states that were written down with it.
 
+    A word that no category has and that is nearly one is logged as a warning, on standard error
+    unless logging is set up otherwise: it is taken as it stands, for a thing of its own.
+
     Args:
         path: the folder.
         domain: which categories and states there are; the household's by default.
-        gate: what observations cannot be; None lets everything in.
+        gate: what observations cannot be; None lets everything in and doubts nothing.
         names: of the run that it is a part of, so that ids mean the same things all along.
         numbered: whether things without an instance get one where there is one frame alone.
 
     Raises:
         FileFormatError: a file is missing or cannot be read as what it should be, or what it says
-            cannot be used.
-        UnknownNameError: an attribute or value that is not in the domain.
+            cannot be used: an attribute or value that is not in the domain, too.
         ObservationError: the gate refuses it.
     """
     folder = Path(path)
@@ -154,9 +159,9 @@ def read_observation(
     reading = _Reading(folder, document, words, names or Names(words), numbered)
     frames = tuple(reading.frame(data, index) for index, data in enumerate(document.frames))
     with _located(folder, "gripper"):
-        hand = reading.hand(document.gripper)
+        hand = reading.hand(document.gripper, "gripper")
     with _located(folder, "other_hands"):
-        others = tuple(reading.hand(other) for other in document.other_hands)
+        others = tuple(reading.hand(other, "other_hands") for other in document.other_hands)
     with _located(folder, "named"):
         told = tuple((n, place(at, document.up)) for n, at in document.named.items())
     with _located(folder, "robot_position_m"):
@@ -171,6 +176,8 @@ def read_observation(
         told=told,
     )
     if gate is not None:
+        for doubt in reading.doubts:
+            _log.warning("forestall: warning: %s", doubt)
         refuse(inspect(observation, words, gate), str(folder / OBSERVATION_FILE))
     return observation, reading.states
 
@@ -180,7 +187,7 @@ def _located(folder: Path, where: str) -> Iterator[None]:
     """Say of a fault in which part of the document it is."""
     try:
         yield
-    except (FileFormatError, UnknownNameError):
+    except FileFormatError:
         raise
     except (InputError, PerceptionError) as error:
         raise FileFormatError(f"{folder / OBSERVATION_FILE}: {where}: {error}") from error
@@ -211,6 +218,8 @@ class _Reading:
         self._names = names
         self._numbered: set[str] = set()
         self.states = GivenStates()
+        self.doubts: list[str] = []
+        self._doubted: set[str] = set()
         told = [d for frame in document.frames for d in frame.detections if d.instance]
         for given in told:
             names.reserve(given.instance or "")
@@ -218,24 +227,40 @@ class _Reading:
             with suppress(InputError):  # said again, with its place, when its turn comes
                 names.instance(given.instance or "", names.words.category(given.category))
 
-    def hand(self, data: _Gripper) -> GripperState:
+    def hand(self, data: _Gripper, where: str) -> GripperState:
         """A hand, with the instances that it holds and let go."""
         up, released_m = self._document.up, data.released_m
         return GripperState(
-            None if data.holding is None else self._instance("holding", data.holding),
+            None if data.holding is None else self._instance(f"{where}.holding", data.holding),
             place(data.position_m, up),
-            None if data.released is None else self._instance("released", data.released),
+            None if data.released is None else self._instance(f"{where}.released", data.released),
             None if released_m is None else place(released_m, up),
             data.name,
             data.told,
             data.width_m,
         )
 
-    def _instance(self, what: str, said: str) -> str:
+    def _instance(self, where: str, said: str) -> str:
         """The instance that is held or was let go, by whatever id."""
-        if said not in self._names and self._names.words.category(said) == said:
-            raise InputError(f"{what} {said!r} needs a number, for example {said}-1")
+        if said not in self._names:
+            kind = self._names.words.category(said)
+            if kind == said:
+                raise InputError(f"{where} {said!r} needs a number, for example {said}-1")
+            self._doubt(where, kind)
         return self._names.instance(said)
+
+    def _doubt(self, where: str, category: str) -> None:
+        """Note a word that means nothing in the domain and is nearly one that does."""
+        if self._names.words.knows(category) or category in self._doubted:
+            return
+        near = nearest(category, self._domain)
+        if near:
+            self._doubted.add(category)
+            self.doubts.append(
+                f"{self._folder / OBSERVATION_FILE}: {where}: the domain {self._domain.name} has "
+                f"no category {category!r}: did you mean {near}? It is taken for a thing of its "
+                "own, which has no states"
+            )
 
     def frame(self, data: _Frame, index: int) -> Frame:
         """One frame with its pictures, as ours."""
@@ -279,12 +304,11 @@ class _Reading:
             where = f"{self._folder / OBSERVATION_FILE}: {place}.detections.{number}"
             try:
                 category, instance = self._named(given)
+                self._doubt(f"{place}.detections.{number}", category)
                 if any(instance is not None and d.instance == instance for d in found):
                     raise InputError(f"instance {instance!r} occurs twice in this frame")
                 if given.states:
                     self._tell(given.states, category, instance)
-            except UnknownNameError:
-                raise
             except InputError as error:
                 raise FileFormatError(f"{where}: {error}") from error
             source = given.id if given.id is not None else given.mask
@@ -309,14 +333,26 @@ class _Reading:
             return category, name
         other = category_of(given.instance)
         if names.words.knows(other) and names.words.category(other) != category:
-            raise InputError(f"instance {given.instance!r} is not a {category}")
+            raise InputError(self._misnamed(given.instance, category))
         return category, names.instance(given.instance, category)
+
+    def _misnamed(self, instance: str, category: str) -> str:
+        """That an id is of another category than the one beside it, and which would do."""
+        own = self._names.words.category(category_of(instance))
+        text = f"instance {instance!r} is not a {category}"
+        if self._names.words.knows(category):
+            return f"{text}: give the category {own}, or another instance, best {category}-N"
+        near = nearest(category, self._domain) or own
+        return f"{text}: the domain has no category {category!r}, did you mean {near}?"
 
     def _tell(self, given: Mapping[str, str], category: str, instance: str | None) -> None:
         """Take down the states of a thing; of what the domain does not know it has none."""
         if instance is None:
             raise InputError(f"states need an instance, for example {category}-1")
-        told = stated(given, category, self._domain)
+        try:
+            told = stated(given, category, self._domain)
+        except InputError as error:
+            raise InputError(f"states: {error}") from error
         if told:
             self.states.setdefault(instance, {}).update(told)
 
@@ -347,7 +383,7 @@ def _mask(
     return mask
 
 
-def _below(frame: Frame) -> _Vec3:
+def _below(frame: Frame) -> Vec3:
     """The floor below a camera: where the robot stands if nothing else is said."""
     x, y, _ = (float(v) for v in frame.camera_to_world[:3, 3])
     return (x, y, 0.0)

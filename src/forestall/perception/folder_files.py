@@ -22,6 +22,7 @@ from forestall.types.observation import Mask, Rgb
 
 _GREY = ("I;16", "I;16B", "I;16L", "I")
 _OPAQUE = 255
+_MOST_TOLD = 20
 
 
 def read_rgb(file: Path) -> Rgb:
@@ -140,6 +141,13 @@ class MaskFile:
             if self.ids is None:
                 raise FileFormatError(f"{where}: 'id' needs masks.png, there is {self.file.name}")
             mask: Mask = self.ids == key
+            if not mask.any():
+                there = [str(i) for i in np.unique(self.ids) if i]
+                more = ", ..." if len(there) > _MOST_TOLD else ""
+                raise FileFormatError(
+                    f"{where}: {self.file} has no pixel with the id {key}; it has "
+                    f"{', '.join(there[:_MOST_TOLD]) or 'none'}{more}"
+                )
             return mask
         if self.ids is not None:
             raise FileFormatError(f"{where}: 'mask' needs masks.npz, there is {self.file.name}")

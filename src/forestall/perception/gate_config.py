@@ -60,8 +60,16 @@ class GateConfig:
         sized_cells: cells of a mask from which its size is judged.
         too_large: visible extent over the category's from which one thing is no such thing.
         all_too_large: the same for all things of a picture, two or more.
-        too_small: the same downwards for a picture with one thing (real: 0.58).
-        all_too_small: the largest of two or more things (real: 0.8).
+        too_small: the same downwards for a picture with one whole thing (real: 0.58).
+        all_too_small: the largest of two or more whole things (kitchens: 0.8; real: 0.58, one
+            alone).
+        covered: share of an outline behind something nearer from which a thing is not whole.
+        covered_step: how much nearer, as a share of the distance.
+        furniture_small: largest of two or more whole things, where the height of furniture says
+            the same of depth.
+        furniture_large: smallest of them.
+        furniture_off: factor of depth that the height of furniture must show at least.
+        furniture_near: factor by which what it shows and what things show may differ.
     """
 
     rows: int = 120
@@ -103,6 +111,12 @@ class GateConfig:
     all_too_large: float = 1.6
     too_small: float = 0.3
     all_too_small: float = 0.5
+    covered: float = 0.1
+    covered_step: float = 0.03
+    furniture_small: float = 0.75
+    furniture_large: float = 1.15
+    furniture_off: float = 1.3
+    furniture_near: float = 1.25
 
 
 @dataclass(frozen=True, slots=True)

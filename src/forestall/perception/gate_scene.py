@@ -1,13 +1,14 @@
 """What depth shows against gravity, the floor, the hand and the sizes of things.
 
-Called by `gate.py`. Rooms are built level: most of their surfaces lie or stand. If they do so by
-another direction than by the stated "up", the pose, the axes or the focal length are wrong. Where
-it is near the stated one, the angle between the two is measured.
+Called by `gate.py`; sizes are judged in `gate_sizes.py`. Rooms are built level: most of their
+surfaces lie or stand. If they do so by another direction than by the stated "up", the pose, the
+axes or the focal length are wrong. Where it is near the stated one, the angle between the two is
+measured.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -16,12 +17,12 @@ import numpy as np
 from forestall.domain.model import Domain
 from forestall.perception.coarse import Coarse
 from forestall.perception.gate_config import GateConfig
+from forestall.perception.gate_sizes import judge_sizes
 from forestall.perception.unproject import Points
 from forestall.types.finding import Finding
 from forestall.types.observation import GripperState, Observation
 
 _PATCHES = 1500
-_APART_M = 0.08
 _DIRECTIONS = 300
 _WIDTHS_DEG = (30.0, 15.0, 6.0)
 _UPWARDS = np.array([[0.0, 0.0, 1.0]])
@@ -49,7 +50,7 @@ def judge_scene(
     if leaning is None:
         yield from _supports(look, index, domain, limits)
     yield from _floor(look, index, observation, domain, limits)
-    yield from _sizes(look, index, domain, limits)
+    yield from judge_sizes(look, index, observation.robot_position_world_m[2], domain, limits)
 
 
 def judge_hand(look: Coarse, hand: GripperState, limits: GateConfig) -> Iterator[Finding]:
@@ -211,50 +212,3 @@ def _floor(
                 "wrong",
                 index,
             )
-
-
-def _sizes(look: Coarse, index: int, domain: Domain, limits: GateConfig) -> Iterator[Finding]:
-    """Visible extents against those of the categories."""
-    found = list(_extents(look, domain, limits))
-    if not found:
-        return
-    one = len(found) == 1
-    ratios = np.array([ratio for _, ratio, _ in found])
-    small = limits.too_small if one else limits.all_too_small
-    whole = [s for s in found if not s[2]]
-    if whole and max(r for _, r, _ in whole) < small and len(whole) == len(found):
-        yield Finding("sizes", _of_sizes(found, "smaller"), index)
-    if float(ratios.min()) > (limits.too_large if one else limits.all_too_large):
-        yield Finding("sizes", _of_sizes(found, "larger"), index)
-
-
-def _of_sizes(found: Sequence[tuple[str, float, bool]], than: str) -> str:
-    listed = ", ".join(f"{name} {ratio:.2g} times" for name, ratio, _ in found[:3])
-    return (
-        f"everything whose size is known is {than} than it can be ({listed} as long as its "
-        "category): the unit of depth or the focal length is wrong"
-    )
-
-
-def _extents(look: Coarse, domain: Domain, limits: GateConfig) -> Iterator[tuple[str, float, bool]]:
-    """Name, visible diagonal over the category's, and whether the border cuts it."""
-    for label, category in enumerate(look.categories):
-        known = domain.find(category)
-        if known is None or not known.size_m:
-            continue
-        cells = look.cells(label)
-        if int(cells.sum()) < limits.sized_cells:
-            continue
-        low, high = np.percentile(_main_part(look, label), (4, 96), axis=0)
-        ratio = float(np.linalg.norm(high - low) / np.linalg.norm(known.size_m))
-        yield look.instances[label] or category, ratio, look.cut(label)
-
-
-def _main_part(look: Coarse, label: int) -> Points:
-    """(n, 3) points of a mask without what a mask that is too wide shows behind or before it."""
-    points = look.points_world_m[look.cells(label)]
-    away = np.linalg.norm(points - look.frame.camera_to_world[:3, 3], axis=1)
-    order = np.argsort(away)
-    part = np.cumsum(np.diff(away[order], prepend=away[order[0]]) > _APART_M)
-    largest: Points = points[order[part == int(np.bincount(part).argmax())]]
-    return largest
