@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -78,7 +79,7 @@ WRONG = [t.replace("Bowl", "Pan") if k > 4 else t for k, t in enumerate(PLANS["s
     ],
 )
 def test_without_a_repair_it_goes_on_as_long_as_nothing_is_lost_by_it(
-    plan: tuple[str, ...], index: int, decision: Decision
+    plan: Sequence[str], index: int, decision: Decision
 ) -> None:
     answer = without_a_repair(egg_in_the_fridge(plan, index))
     assert answer.decision is decision
@@ -118,7 +119,7 @@ def without(graph: SceneGraph, things: set[str]) -> SceneGraph:
     )
 
 
-def egg_in_the_fridge(plan: tuple[str, ...], index: int) -> BoundaryContext:
+def egg_in_the_fridge(plan: Sequence[str], index: int) -> BoundaryContext:
     """Before a step of a plan that fails, with the egg in a shut fridge into which nobody saw."""
     graph = scene(home_of("store-egg"), "Pan-1 on CounterTop-1", "Fridge-1 hidden")
     inside = {r.subject for r in graph.relations if r.object == "Fridge-1"}

@@ -34,6 +34,7 @@ from forestall.seams.language import LanguageModel
 from forestall.seams.others import DataSet, Foreign, PlanSet
 from forestall.seams.perceiving import (
     Captioner,
+    ConfidentStateEstimator,
     Finder,
     ImageEncoder,
     ImageTextEncoder,
@@ -47,6 +48,7 @@ from forestall.seams.running import GoalChecker, Listener, LookListener, Parts
 
 __all__ = [
     "Captioner",
+    "ConfidentStateEstimator",
     "DataSet",
     "DemonstrationStore",
     "Detector",
