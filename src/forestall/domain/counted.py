@@ -94,9 +94,9 @@ def _look(formula: Formula, names: _Names) -> _Found:
         return _joined([_look(p, names) for p in formula.parts], isinstance(formula, And))
     if isinstance(formula, Fewer):
         category = names.category(formula.of)
-        if isinstance(formula.bound, str) and category is not None:
-            if names.domain.number(category, formula.bound) is None:
-                return _Found(True)
+        counts = isinstance(formula.bound, str) and category is not None
+        if counts and names.domain.number(str(category), str(formula.bound)) is None:
+            return _Found(True)
         inner = _look(formula.part, names.without([formula.variable.name]))
         return _Found(True) if inner.truth is False else _Found(None, inner.asked)
     inner = _look(formula.part, names.without(v.name for v in formula.variables))
