@@ -26,18 +26,7 @@ def check_domain(domain: Domain) -> None:
         InputError: the first thing that is wrong.
     """
     for predicate in domain.predicates.values():
-        if predicate.definition is not None:
-            label = f"definition of {predicate.name}"
-            known = {p.name for p in predicate.parameters}
-            _within(_keys(f"[predicates.{predicate.name}]"), _check, domain, label,
-                    predicate.definition, known)  # fmt: skip
-        _kinds(domain, f"predicate {predicate.name}", predicate.parameters)
-        if predicate.offered_by and not domain.known_kind(predicate.offered_by):
-            raise keyed(UnknownNameError(f"tag in offered_by of {predicate.name}",
-                        predicate.offered_by, domain.tags), f"[predicates.{predicate.name}]")  # fmt: skip
-        if predicate.paired not in ("", "same number", "same number or first"):
-            options = ("same number", "same number or first")
-            raise UnknownNameError(f"paired of {predicate.name}", predicate.paired, options)
+        _predicate(domain, predicate)
     _stratified(domain)
     for skill in domain.skills.values():
         _within(_keys(f"[skills.{skill.name}]"), _skill, domain, skill)
@@ -71,6 +60,22 @@ def check_domain(domain: Domain) -> None:
     from forestall.domain.settling import check_settling
 
     check_settling(domain)
+
+
+def _predicate(domain: Domain, predicate: Predicate) -> None:
+    keys = _keys(f"[predicates.{predicate.name}]")
+    if predicate.definition is not None:
+        label = f"definition of {predicate.name}"
+        known = {p.name for p in predicate.parameters}
+        _within(keys, _check, domain, label, predicate.definition, known)
+    _kinds(domain, f"predicate {predicate.name}", predicate.parameters)
+    offers = predicate.offered_by
+    if offers and not domain.known_kind(offers):
+        what = f"tag in offered_by of {predicate.name}"
+        raise keyed(UnknownNameError(what, offers, domain.tags), *keys)
+    if predicate.paired not in ("", "same number", "same number or first"):
+        options = ("same number", "same number or first")
+        raise UnknownNameError(f"paired of {predicate.name}", predicate.paired, options)
 
 
 def _moment(domain: Domain, label: str, rule: SafetyRule) -> None:
@@ -137,14 +142,7 @@ def _skill(domain: Domain, skill: Skill) -> None:
     for choice in skill.choices:
         for formula in (*choice.among, choice.such_that, choice.only_if):
             _check(domain, f"choice of {label}", formula, known | made | chosen)
-    for need in skill.needs:
-        _check(domain, f"need of {label}", need.formula, known | chosen)
-        if need.find is not None:
-            _check(domain, f"need of {label}", need.find, known | chosen)
-        told = (need.formula, *([] if need.find is None else [need.find]))
-        found = {v.name for formula in told for v in variables(formula)}
-        for fact in need.lacking:
-            _check(domain, f"lacks of {label}", fact, known | chosen | found)
+    _needs(domain, label, skill, known | chosen)
     if skill.undoes is not None:
         _check(domain, f"undoes of {label}", skill.undoes, known)
     for formula in (*skill.prefers, *([skill.done_when] if skill.done_when else [])):
@@ -154,6 +152,16 @@ def _skill(domain: Domain, skill: Skill) -> None:
     for variable in (skill.at, skill.hand):
         if variable is not None and variable not in known | made | chosen:
             raise _unbound(label, variable, known)
+
+
+def _needs(domain: Domain, label: str, skill: Skill, known: set[str]) -> None:
+    for need in skill.needs:
+        told = (need.formula, *([] if need.find is None else [need.find]))
+        for formula in told:
+            _check(domain, f"need of {label}", formula, known)
+        found = {v.name for formula in told for v in variables(formula)}
+        for fact in need.lacking:
+            _check(domain, f"lacks of {label}", fact, known | found)
 
 
 def _effect(domain: Domain, label: str, effect: Effect, known: set[str]) -> None:
