@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from forestall.assembly.configuration import Given, read_file, run_config
-from forestall.assembly.make import make_strategy, prepare, provenance
+from forestall.assembly.make import make_strategy, prepare, provenance, run_episode
 from forestall.assembly.parts import Assembly
 from forestall.cli.flags import RunFlags, spelt
 from forestall.domain.load import shipped
@@ -56,6 +56,88 @@ def test_flags_come_over_the_file_and_the_file_over_defaults(tmp_path: Path) -> 
     assert dict(detector.defaulted)["floor"] == 0.8
     other = run_config("heat-potato", given=RunFlags(detector="image").given().over(given))
     assert other.choice(DETECTOR).given == ()
+
+
+LAB = """
+name = "lab"
+tags = ["movable", "fixture", "support"]
+
+[roles]
+holding = "held_by"
+
+[predicates.held_by]
+kind = "relation"
+parameters = ["thing", "hand"]
+group = "place"
+
+[predicates.rests_on]
+kind = "relation"
+parameters = ["thing", "place"]
+contains = true
+group = "place"
+offered_by = "support"
+
+[categories.Bench]
+tags = ["fixture", "support"]
+
+[categories.Scale]
+tags = ["fixture", "support"]
+
+[categories.Vial]
+tags = ["movable"]
+
+[skills.lift]
+parameters = ["thing - movable"]
+needs = ["not some ?x: held_by(?x, gripper)"]
+effects = ["held_by(?thing, gripper)"]
+
+[skills.weigh]
+parameters = ["vial - Vial", "scale - Scale"]
+needs = ["held_by(?vial, gripper)"]
+effects = ["rests_on(?vial, ?scale)"]
+"""
+
+WEIGH = """
+name = "weigh-vial"
+title = "Weigh the vial"
+domain = "lab.toml"
+plan = ["lift(Vial)", "weigh(Vial, Scale)"]
+
+[goal]
+text = "."
+all = ["rests_on(Vial, Scale)"]
+
+[scene]
+objects = [{ category = "Vial", places = ["Bench"] }]
+"""
+
+
+def own_task(folder: Path, table: str = "") -> str:
+    (folder / "lab.toml").write_text(LAB + table)
+    (folder / "weigh.toml").write_text(WEIGH)
+    return str(folder / "weigh.toml")
+
+
+def test_a_domain_that_nothing_simulates_runs_in_a_symbolic_world(tmp_path: Path) -> None:
+    task = own_task(tmp_path)
+    config = run_config(task, strategy="none")
+    assert (config.choice(WORLD).name, config.choice(PERCEIVER).name) == ("symbolic", "given-graph")
+    assert run_episode(prepare(config), None).success
+
+
+def test_what_is_said_of_world_and_perceiver_stays(tmp_path: Path) -> None:
+    task = own_task(tmp_path)
+    assert run_config(task, world="symbolic").choice(PERCEIVER).name == "given-graph"
+    assert run_config(task, perceiver="graph").choice(WORLD).name == "symbolic"
+    assert run_config(task, perceiver="graph").choice(PERCEIVER).name == "graph"
+    config = run_config(task, world="kitchen", strategy="none")
+    assert config.choice(WORLD).name == "kitchen"
+    with pytest.raises(InputError, match="kitchen does not simulate the domain lab"):
+        run_episode(prepare(config), None)
+    own_task(tmp_path, '\n[run]\nworld = "kitchen"\n')
+    assert run_config(task).choice(WORLD).name == "kitchen"
+    assert run_config("heat-potato").choice(WORLD).name == "kitchen"
+    assert run_config("heat-potato").choice(PERCEIVER).name == "graph"
 
 
 def test_options_are_spelt_with_the_kind_before_them() -> None:

@@ -156,9 +156,74 @@ unknown role
 unknown predicate in roles.holding 'held': did you mean held_by?
 
 skill of the robot
-skills = ["grasps"] <- hands = ["hand"]
+[robot] skills <- hands = ["hand"]
 "grasps"
 unknown skill of the robot 'grasps': did you mean grasp?
+
+tag of a role
+[roles] support <- [robot]
+"moveable"
+unknown tag in roles.movable 'moveable': did you mean movable?
+
+tag of a role that is called as usual and is no tag
+[roles] usual <- [robot]
+"support"
+unknown tag in roles.support 'support': known: fixture, movable
+
+tag of what offers a relation
+offered_by = "fixtur" <- contains = true
+fixtur"
+unknown tag in offered_by of on 'fixtur': did you mean fixture?
+
+hand in a need
+not held_by(?object, hnad)" <- clear(?object)"
+hnad
+unknown hand, constant or category in need of skill grasp 'hnad': did you mean hand?
+
+hand in an effect
+held_by(?object, hnad) <- held_by(?object, hand)
+hnad
+unknown hand, constant or category in effect of skill grasp 'hnad': did you mean hand?
+
+hand of the robot
+hands = ["hnad"] <- hands = ["hand"]
+hand)
+unknown hand, constant or category in effect of skill grasp 'hand': did you mean hnad?
+
+thing in a definition
+on(?y, Trai)" <- on(?y, ?thing)"
+Trai
+unknown hand, constant or category in definition of clear 'Trai': did you mean Tray?
+
+thing whose number is counted
+fewer than room(Trai) of ?y: on(?y, ?target)" <- has_power(?target)"
+Trai
+unknown hand, constant or category in need of skill switch 'Trai': did you mean Tray?
+
+thing in the condition of a process
+on(?thing, Trai) <- on(?thing, ?tray)
+Trai
+unknown hand, constant or category in process heat 'Trai': did you mean Tray?
+
+thing in a safety rule
+never = "on(?tray, Trai-2)" <- never = "power(?tray)=on"
+Trai
+unknown hand, constant or category in safety rule left_on 'Trai-2': did you mean Tray?
+
+predicate of what would help
+lacks predicate <- on {object}" }
+claer
+unknown predicate in lacks of skill grasp 'claer': did you mean clear?
+
+thing of what would help
+lacks thing <- on {object}" }
+hnad
+unknown hand, constant or category in lacks of skill grasp 'hnad': did you mean hand?
+
+variable of what would help
+lacks variable <- on {object}" }
+?objekt
+unknown variable in lacks of skill grasp: nothing binds it: '?objekt': did you mean ?object?
 
 constant of an unknown category
 [constants] tray <- [robot]
@@ -173,6 +238,12 @@ unknown when of safety rule left_on 'leavin': did you mean leaving?
 """Name; what is written in place of what; where the fault is; what is said."""
 
 LONGER = {
+    "[robot] skills": 'hands = ["hand"]\nskills = ["grasps"]',
+    "[roles] support": '[roles]\nmovable = "moveable"\n\n[robot]',
+    "[roles] usual": '[roles]\nmovable = "movable"\nsupport = "support"\n\n[robot]',
+    "lacks predicate": 'on {object}", lacks = ["claer(?object)"] }',
+    "lacks thing": 'on {object}", lacks = ["held_by(?object, hnad)"] }',
+    "lacks variable": 'on {object}", lacks = ["clear(?objekt)"] }',
     "TWO_THAT_UNDO": TWO_THAT_UNDO,
     "[roles] holding": '[roles]\nholding = "held"\n\n[robot]',
     "[constants] tray": '[constants]\ntray = "Try"\n\n[robot]',

@@ -2,13 +2,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from forestall.domain.load import shipped
+from forestall.domain.load import extend, shipped
 from forestall.domain.model import Domain
 from forestall.errors import PerceptionError
 from forestall.perception.config import PerceptionConfig, ScopeConfig
@@ -282,6 +283,7 @@ SCOPES = {
     "put_on(Plate-1, CounterTop-1)": "CounterTop-1 Plate-1 Potato-1 gripper",
     "toggle_on(StoveBurner-3)": "Plate-1 Potato-1 StoveBurner-3 StoveKnob-3 gripper",
     "pick_up(Egg-1)": "Egg-1 Fridge-1 Plate-1 Potato-1 gripper",
+    "pour(Plate-1, CounterTop-1)": "CounterTop-1 Plate-1 Potato-1 gripper",  # refused anyway
     "pick_up(Tomato-1)": "Faucet-1 Plate-1 Potato-1 Sink-1 Tomato-1 gripper",
 }
 
@@ -291,6 +293,27 @@ def test_a_scope_keeps_what_concerns_the_subtask(text: str) -> None:
     graph = scoped(text)
     assert " ".join(n.id for n in graph.nodes) == SCOPES[text]
     assert str(graph.subtask) == text
+
+
+COUNTED = "CounterTop-1 Knife-1 Mug-1 Plate-1 Pot-1 Potato-1 gripper"
+UNCOUNTED = "CounterTop-1 Plate-1 Potato-1 gripper"
+
+
+@pytest.mark.parametrize("counter", ["CounterTop-1", "CounterTop"])
+@pytest.mark.parametrize(
+    ("told", "kept"),
+    [
+        ({"tags": ["limited"], "capacity": 1}, COUNTED),
+        ({"tags": ["limited"]}, UNCOUNTED),  # no number to count up to
+        ({"capacity": 1}, UNCOUNTED),  # the skill asks for the number of what is limited alone
+    ],
+)
+def test_a_scope_keeps_the_contents_of_a_support_that_the_skill_counts(
+    told: dict[str, Any], kept: str, counter: str
+) -> None:
+    domain = extend(shipped("household"), {"CounterTop": told}, {})
+    graph = scoped(f"put_on(Plate-1, {counter})", domain=domain)
+    assert " ".join(n.id for n in graph.nodes if n.id != "CounterTop-2") == kept
 
 
 def test_a_scope_keeps_semantic_relations_among_its_nodes() -> None:

@@ -117,6 +117,17 @@ def test_all_faults_of_a_task_are_said_with_what_would_be_valid(tmp_path: Path) 
     assert len(faults) == len(SAID)
 
 
+def test_a_thing_of_another_kind_than_the_skill_takes_is_said_with_its_step(
+    tmp_path: Path,
+) -> None:
+    text = TASK.replace("insert(RoundPeg, RoundHole)", "insert(Tray-1, RoundPeg)")
+    peg, hole = check_file(written(tmp_path, text)).faults
+    assert peg.startswith("plan[2]: insert(Tray-1, RoundPeg): Tray-1 is no peg: peg of insert")
+    assert "RoundPeg" in peg.partition("can be")[2]
+    assert hole.startswith("plan[2]: insert(Tray-1, RoundPeg): RoundPeg is no hole: hole of insert")
+    assert "RoundHole" in hole.partition("can be")[2]
+
+
 def test_all_faults_of_a_scenario_are_said(tmp_path: Path) -> None:
     checked = check_file(written(tmp_path, SCENARIO))
     assert checked.kind == "scenario" and len(checked.faults) == 5

@@ -20,7 +20,7 @@ from forestall.assembly.tables import TABLES
 from forestall.domain.model import Domain
 from forestall.domain.toml_out import domain_toml
 from forestall.errors import FileFormatError, InputError, UnknownNameError
-from forestall.kinds import DOMAIN
+from forestall.kinds import DOMAIN, PERCEIVER, WORLD
 from forestall.reading.documents import read_toml
 from forestall.tasks.files import LoadedTask, load_task
 from forestall.types.kind import Kind
@@ -47,6 +47,9 @@ WITHOUT = (*SWITCHES, "reasoning", "validation")
 
 NAME = "name"
 """What a part is called, where its options stand, too; no option has this name."""
+
+SYMBOLIC, SYMBOLIC_PERCEIVER = "symbolic", "given-graph"
+"""The world of a domain that nothing simulates, and what sees in it: it shows scene graphs."""
 
 RUN_KEYS = ("scenario", "seed", "without")
 """What a configuration file may say besides its tables of parts."""
@@ -161,6 +164,10 @@ class Given:
         """What something was said about."""
         return tuple(kind for kind, _, _ in self.parts)
 
+    def name(self, kind: str) -> str | None:
+        """The part of a kind that was said; None where none was."""
+        return next((name for k, name, _ in self.parts if k == kind), None)
+
     def chosen(self, kind: str) -> Choice:
         """The checked choice of a kind: what was said, over the defaults.
 
@@ -256,7 +263,8 @@ def run_config(
         keep_observations: whether pictures stay in the record.
         final_look: whether the robot looks once more when the plan is finished.
         given: what was said about parts, in a file or by flags, the domain among them: a name or a
-            file. What is not said is as the run's domain has it, else as the tables have it.
+            file. What is not said is as the run's domain has it (`fitting`), else as the tables
+            have it.
         **named: the same by keyword, over `given`: `strategy="online"`,
             `detector={"name": "objects", "threshold": 0.8}`, or a short name of `SHORT`.
 
@@ -269,7 +277,7 @@ def run_config(
     if task:
         domain = load_task(task, None if own is None else domain_of(own)).domain
         parts = tuple(part for part in said.parts if part[0] != DOMAIN.name)
-        said = Given(parts).over(Given.named(dict(domain.run)))
+        said = fitting(Given(parts), domain)
         own = own or Choice(DOMAIN.name, domain.name)
     chosen = choices(_ablated(said, without))
     chosen = tuple(own if own is not None and c.kind == own.kind else c for c in chosen)
@@ -283,6 +291,22 @@ def run_config(
         final_look,
         other,
     )
+
+
+def fitting(said: Given, domain: Domain) -> Given:
+    """What was said, over what a run in a domain has where nothing is said.
+
+    That is what the domain's table `run` says; without a world in it, the symbolic one where the
+    default world does not simulate the domain; and in the symbolic world its perceiver.
+    """
+    said = said.over(Given.named(dict(domain.run)))
+    if said.name(WORLD.name) is None:
+        usual = find(WORLD.name, table(WORLD.name).default).factory
+        if not getattr(usual, "simulates", lambda domain: True)(domain):
+            said = said.over(Given.named({WORLD.name: SYMBOLIC}))
+    if said.name(WORLD.name) == SYMBOLIC:
+        said = said.over(Given.named({PERCEIVER.name: SYMBOLIC_PERCEIVER}))
+    return said
 
 
 def choices(given: Given) -> tuple[Choice, ...]:
@@ -315,7 +339,7 @@ def said_domain(given: Given, task: str = "") -> Choice | None:
     Raises:
         UnknownNameError: no installed domain, no file, and not the task's own.
     """
-    name = next((name for kind, name, _ in given.parts if kind == DOMAIN.name), None)
+    name = given.name(DOMAIN.name)
     if name is None:
         return None
     try:

@@ -6,10 +6,10 @@ nearest names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import fields
 
-from forestall.domain.formula import Formula, Parameter, free, literals, variables
+from forestall.domain.formula import Formula, Parameter, counted_of, free, literals, variables
 from forestall.domain.located import keyed
 from forestall.domain.model import BUILT_IN, FACING, LOCATED, SAME, SAME_CATEGORY, Domain
 from forestall.domain.schema import Effect, Predicate, PredicateKind, Roles, SafetyRule, Skill
@@ -26,15 +26,7 @@ def check_domain(domain: Domain) -> None:
         InputError: the first thing that is wrong.
     """
     for predicate in domain.predicates.values():
-        if predicate.definition is not None:
-            label = f"definition of {predicate.name}"
-            known = {p.name for p in predicate.parameters}
-            _within(_keys(f"[predicates.{predicate.name}]"), _check, domain, label,
-                    predicate.definition, known)  # fmt: skip
-        _kinds(domain, f"predicate {predicate.name}", predicate.parameters)
-        if predicate.paired not in ("", "same number", "same number or first"):
-            options = ("same number", "same number or first")
-            raise UnknownNameError(f"paired of {predicate.name}", predicate.paired, options)
+        _predicate(domain, predicate)
     _stratified(domain)
     for skill in domain.skills.values():
         _within(_keys(f"[skills.{skill.name}]"), _skill, domain, skill)
@@ -53,7 +45,9 @@ def check_domain(domain: Domain) -> None:
             known_whens = ("leaving", *domain.skills)
             raise keyed(UnknownNameError(f"when of {label}", rule.when, known_whens), *keys)
         _within(keys, _moment, domain, label, rule)
-    _roles(domain)
+    usual = Roles()
+    told = (f.name for f in fields(Roles))
+    check_roles(domain, [n for n in told if getattr(domain.roles, n) != getattr(usual, n)])
     for thing, category in domain.constants:
         if category not in domain.categories:
             raise keyed(
@@ -66,6 +60,22 @@ def check_domain(domain: Domain) -> None:
     from forestall.domain.settling import check_settling
 
     check_settling(domain)
+
+
+def _predicate(domain: Domain, predicate: Predicate) -> None:
+    keys = _keys(f"[predicates.{predicate.name}]")
+    if predicate.definition is not None:
+        label = f"definition of {predicate.name}"
+        known = {p.name for p in predicate.parameters}
+        _within(keys, _check, domain, label, predicate.definition, known)
+    _kinds(domain, f"predicate {predicate.name}", predicate.parameters)
+    offers = predicate.offered_by
+    if offers and not domain.known_kind(offers):
+        what = f"tag in offered_by of {predicate.name}"
+        raise keyed(UnknownNameError(what, offers, domain.tags), *keys)
+    if predicate.paired not in ("", "same number", "same number or first"):
+        options = ("same number", "same number or first")
+        raise UnknownNameError(f"paired of {predicate.name}", predicate.paired, options)
 
 
 def _moment(domain: Domain, label: str, rule: SafetyRule) -> None:
@@ -132,10 +142,9 @@ def _skill(domain: Domain, skill: Skill) -> None:
     for choice in skill.choices:
         for formula in (*choice.among, choice.such_that, choice.only_if):
             _check(domain, f"choice of {label}", formula, known | made | chosen)
-    for need in skill.needs:
-        _check(domain, f"need of {label}", need.formula, known | chosen)
-        if need.find is not None:
-            _check(domain, f"need of {label}", need.find, known | chosen)
+    _needs(domain, label, skill, known | chosen)
+    if skill.undoes is not None:
+        _check(domain, f"undoes of {label}", skill.undoes, known)
     for formula in (*skill.prefers, *([skill.done_when] if skill.done_when else [])):
         _check(domain, label, formula, known | chosen)
     for effect in skill.effects:
@@ -143,6 +152,16 @@ def _skill(domain: Domain, skill: Skill) -> None:
     for variable in (skill.at, skill.hand):
         if variable is not None and variable not in known | made | chosen:
             raise _unbound(label, variable, known)
+
+
+def _needs(domain: Domain, label: str, skill: Skill, known: set[str]) -> None:
+    for need in skill.needs:
+        told = (need.formula, *([] if need.find is None else [need.find]))
+        for formula in told:
+            _check(domain, f"need of {label}", formula, known)
+        found = {v.name for formula in told for v in variables(formula)}
+        for fact in need.lacking:
+            _check(domain, f"lacks of {label}", fact, known | found)
 
 
 def _effect(domain: Domain, label: str, effect: Effect, known: set[str]) -> None:
@@ -173,10 +192,21 @@ def _effect(domain: Domain, label: str, effect: Effect, known: set[str]) -> None
 def _check(domain: Domain, label: str, formula: Formula, known: set[str]) -> None:
     for literal, _ in literals(formula):
         check_literal(domain, label, literal)
+        _things(domain, label, literal.args)
+    _things(domain, label, counted_of(formula))
     _kinds(domain, label, tuple(variables(formula)))
     loose = free(formula) - known
     if loose:
         raise _unbound(label, sorted(loose)[0], known)
+
+
+def _things(domain: Domain, label: str, names: Iterable[str]) -> None:
+    """See that what is no variable is a hand, a constant, or a category or a thing of one."""
+    known = (*domain.robot.hands, *(thing for thing, _ in domain.constants))
+    for name in names:
+        if not name.startswith("?") and name not in known and domain.find(name) is None:
+            raise UnknownNameError(f"hand, constant or category in {label}", name,
+                                   (*known, *domain.categories))  # fmt: skip
 
 
 def _unbound(label: str, name: str, known: Iterable[str]) -> UnknownNameError:
@@ -240,20 +270,27 @@ _ROLE_KINDS = {
 }  # fmt: skip
 
 
-def _roles(domain: Domain) -> None:
+def check_roles(domain: Domain, given: Container[str]) -> None:
+    """See that the roles that somebody gave name predicates and tags of the domain.
+
+    Raises:
+        UnknownNameError: the first that does not, with those that would do.
+    """
     for f in fields(Roles):
-        given = getattr(domain.roles, f.name)
+        if f.name not in given:
+            continue
+        named = getattr(domain.roles, f.name)
         if f.name in _ROLE_KINDS:
             fitting: dict[str, Predicate] = {
                 p.name: p for p in domain.predicates.values() if p.kind is _ROLE_KINDS[f.name]
             }
-            if given is not None and given not in fitting:
+            if named is not None and named not in fitting:
                 raise keyed(
-                    UnknownNameError(f"predicate in roles.{f.name}", given, fitting), "[roles]"
+                    UnknownNameError(f"predicate in roles.{f.name}", named, fitting), "[roles]"
                 )
-        elif isinstance(given, tuple):
-            for tag in given:
-                if tag not in domain.tags:
+        else:
+            for tag in named if isinstance(named, tuple) else (named,):
+                if tag not in domain.tags and not (tag == named and domain.known_kind(tag)):
                     raise keyed(
                         UnknownNameError(f"tag in roles.{f.name}", tag, domain.tags), "[roles]"
                     )

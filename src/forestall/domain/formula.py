@@ -182,6 +182,19 @@ def variables(formula: Formula) -> Iterator[Parameter]:
         yield from variables(formula.part)
 
 
+def counted_of(formula: Formula) -> Iterator[str]:
+    """Every name whose category bounds a count: ?x of "fewer than capacity(?x) of ..."."""
+    if isinstance(formula, Not):
+        yield from counted_of(formula.part)
+    elif isinstance(formula, And | Or):
+        for part in formula.parts:
+            yield from counted_of(part)
+    elif not isinstance(formula, Literal):
+        if isinstance(formula, Fewer) and formula.of:
+            yield formula.of
+        yield from counted_of(formula.part)
+
+
 def normal(formula: Formula, positive: bool = True) -> Formula:
     """Negation normal form: `Not` stands nowhere but before a `Fewer`.
 

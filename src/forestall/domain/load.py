@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from forestall.domain.checks import check_domain
+from forestall.domain.checks import check_domain, check_roles
 from forestall.domain.formula import parse_formula
 from forestall.domain.located import keyed, located
 from forestall.domain.model import BUILT_IN, Domain
@@ -144,6 +144,7 @@ def build_domain(data: Mapping[str, Any]) -> Domain:
         run=_pairs("run", data),
     )
     check_domain(domain)
+    check_roles(domain, as_table("roles", data.get("roles", {})))
     return domain
 
 

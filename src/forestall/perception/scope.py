@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 
+from forestall.domain.counted import counted
 from forestall.domain.model import Domain
 from forestall.perception.config import ScopeConfig
 from forestall.types.facts import category_of
@@ -14,7 +15,8 @@ from forestall.types.plan import Subtask
 def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConfig) -> SceneGraph:
     """Arguments, what holds them, what is in, on or before them, the hand, devices at work.
 
-    A category name as argument stands for every node of that category.
+    A category name as argument stands for every node of that category. What holds many things by
+    nature loses its contents, unless the skill itself asks for them.
     """
     if config.whole:
         return SceneGraph(graph.nodes, graph.relations, subtask, graph.hidden)
@@ -25,10 +27,13 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
     kept |= set(held)
     for name in sorted(kept):
         kept |= _holders(graph, name, domain)
+    asked: set[str] = set()
+    if any(is_crowded(a, domain) for a in subtask.args):
+        asked = {i for a in counted(subtask, domain) for i in graph.matches(domain.canonical(a))}
     for name in sorted(kept):
         argument = name in arguments or name in held
         if argument or (config.fellows and name in _direct(graph, arguments, domain)):
-            kept |= _contents(graph, name, domain)
+            kept |= _contents(graph, name, domain, asked)
     kept |= {
         r.subject
         for r in graph.relations
@@ -61,13 +66,20 @@ def _holders(graph: SceneGraph, name: str, domain: Domain) -> set[str]:
     return found
 
 
-def _contents(graph: SceneGraph, name: str, domain: Domain) -> set[str]:
-    """What is in or on a node, at any depth, unless it holds many things by nature."""
+def _contents(graph: SceneGraph, name: str, domain: Domain, asked: Set[str]) -> set[str]:
+    """What is in or on a node, at any depth, but not of what holds many things by nature.
+
+    Args:
+        graph: the whole scene.
+        name: of the node.
+        domain: that says what holds many things.
+        asked: nodes whose contents are wanted all the same.
+    """
     found: set[str] = set()
     pending = [name]
     while pending:
         current = pending.pop()
-        if is_crowded(current, domain):
+        if is_crowded(current, domain) and current not in asked:
             continue
         for child in graph.contents(current, domain.containing):
             if child not in found:

@@ -128,7 +128,11 @@ class OpenWorld(Protocol):
 
 
 class WorldPart(Protocol):
-    """Makes worlds of one sort: the part of a run that stands for robot and surroundings."""
+    """Makes worlds of one sort: the part of a run that stands for robot and surroundings.
+
+    One that does not know every domain may say so in a static method `simulates(domain)`; where
+    nobody named a world, a domain that the default one does not simulate has a symbolic one.
+    """
 
     name: str
 

@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from forestall.config import DEFAULT_DOMAIN
+from forestall.domain.formula import Parameter
 from forestall.domain.load import extend, load_domain
 from forestall.domain.model import Domain
 from forestall.errors import FileFormatError, InputError, UnknownNameError
@@ -35,6 +36,9 @@ from forestall.tasks.files import (
 from forestall.tasks.scene_faults import FaultTable
 from forestall.tasks.schemas import ScenarioFile, ScenarioSetFile, TaskFile
 from forestall.types.plan import Plan, Subtask
+
+_SHOWN = 8
+"""How many categories that would do are named."""
 
 
 @dataclass(slots=True)
@@ -183,6 +187,22 @@ def _steps(checked: CheckedFile, place: str, texts: Mapping[int, str], domain: D
                 with checked.at(f"{place}[{number}]"):
                     domain[name]
             domain.check(step)
+            for name, parameter in zip(step.args, domain.skill(step.skill).parameters, strict=True):
+                with checked.at(f"{place}[{number}]"):
+                    _fits(step, name, parameter, domain)
+
+
+def _fits(step: Subtask, name: str, parameter: Parameter, domain: Domain) -> None:
+    """See that an argument is of the kind that the skill takes there."""
+    kind = parameter.kind
+    if kind is None or domain.find(name) is None or domain.is_a(name, kind):
+        return
+    fitting = sorted(c for c in domain.categories if domain.is_a(c, kind))
+    shown = (
+        fitting if len(fitting) <= _SHOWN else [*fitting[:_SHOWN], f"... ({len(fitting)} in all)"]
+    )
+    role, those = parameter.name.removeprefix("?"), ", ".join(shown) or "nothing"
+    raise InputError(f"{step}: {name} is no {kind}: {role} of {step.skill} can be {those}")
 
 
 def _goal(checked: CheckedFile, goal: Mapping[str, Any], domain: Domain) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from forestall.domain.load import shipped
-from forestall.errors import UnknownNameError
+from forestall.errors import InputError, UnknownNameError
 from forestall.types.scene import SceneNeeds
 from forestall.worlds.kitchen import environment as environments
 from forestall.worlds.kitchen.environment import KitchenEnvironment
@@ -32,6 +32,16 @@ def test_frames_are_remembered_only_where_many_runs_follow(monkeypatch: pytest.M
             assert opened.environment is opened.disturbance
     assert made[0] is None
     assert made[1] is made[2] is not None
+
+
+def test_a_domain_without_the_kitchens_words_is_refused_and_told_another_world() -> None:
+    assert Kitchens.simulates(shipped("household"))
+    assert not Kitchens.simulates(shipped("bench"))
+    with (
+        pytest.raises(InputError, match=r"kitchen does not simulate.*bench.*filled.*symbolic"),
+        Kitchens().open(SceneNeeds(), shipped("bench")),
+    ):
+        pass
 
 
 def test_it_says_what_of_it_works_here() -> None:

@@ -219,13 +219,31 @@ def shipped_catalogue() -> Catalogue:
     return Catalogue(categories, attributes, frozenset(attributes))
 
 
+def lacking(domain: Domain) -> tuple[str, ...]:
+    """Attributes and relations of the kitchen's things that a domain lacks, sorted.
+
+    The kitchen simulates no domain that lacks one: it could not say how its things are.
+    """
+    own = shipped_catalogue()
+    relations = {c.receptacle.relation for c in own.categories.values() if c.receptacle}
+    return tuple(
+        sorted((own.own - domain.attributes.keys()) | (relations - domain.relations.keys()))
+    )
+
+
 def catalogue(domain: Domain) -> Catalogue:
     """The kitchen's catalogue with what a task file added to its domain.
 
     Raises:
-        InputError: a shape that the kitchen cannot build.
+        InputError: a domain that the kitchen does not simulate, or a shape that it cannot build.
     """
     own = shipped_catalogue()
+    if missing := lacking(domain):
+        raise InputError(
+            f"the world kitchen does not simulate the domain {domain.name}, which has no "
+            f"{', '.join(missing)}: leave the world out, or say another one "
+            '(--world symbolic; world = "symbolic" in the table [run] of the domain file)'
+        )
     attributes = {n: own.attributes.get(n, a.values) for n, a in domain.attributes.items()}
     categories = dict(own.categories)
     for name, described in domain.categories.items():

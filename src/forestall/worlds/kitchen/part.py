@@ -16,6 +16,7 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.extras import need
 from forestall.types.scene import SceneNeeds
 from forestall.types.world import Working
+from forestall.worlds.kitchen.catalogue import lacking
 from forestall.worlds.kitchen.imperfection import Rates
 from forestall.worlds.kitchen.ithor import draws
 from forestall.worlds.kitchen.law import WAYS
@@ -118,11 +119,20 @@ class Kitchens:
         self._shares_names = not own
         self._frames = FrameMemory()
 
+    @staticmethod
+    def simulates(domain: Domain) -> bool:
+        """Whether the kitchen's things can be told in the words of a domain."""
+        return not lacking(domain)
+
     @contextmanager
     def open(
         self, needs: SceneNeeds, domain: Domain, remember: bool = False
     ) -> Iterator[OpenKitchen]:
-        """See the Protocol."""
+        """See the Protocol.
+
+        Raises:
+            InputError: a domain that it does not simulate.
+        """
         from forestall.worlds.kitchen.environment import KitchenEnvironment
 
         frames = self._frames if remember else None
