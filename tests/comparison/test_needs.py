@@ -91,6 +91,25 @@ def test_support_is_told_at_each_level_with_the_one_that_it_was_kept_at() -> Non
     assert (found.kept, found.support, found.total) == (Specificity.PART, 5, 5)
 
 
+def test_a_demonstration_is_counted_once_on_however_many_kinds_a_skill_was_used_in_it() -> None:
+    both = [run("now", f"d{i}", pick("Mug"), pick("Cup")) for i in range(4)]
+    found = mined(both, "pick_up(Mug-1)")["unblocked(?object)"]
+    assert (found.kept, found.support, found.total) == (Specificity.PART, 4, 4)
+    assert [(s.true, s.seen) for s in found.levels] == [(4, 4)] * 3
+    assert found.weight == pytest.approx(weight(8, 8)), "each kind of thing is evidence of its own"
+
+
+def test_what_held_for_one_kind_and_not_for_another_did_not_hold_in_that_demonstration() -> None:
+    blocked = pick("Cup", relations="Pot-1 blocking Cup-1")
+    runs = [run("now", f"d{i}", pick("Mug"), pick("Cup")) for i in range(59)]
+    counts = Needs.of([*runs, run("now", "odd", pick("Mug"), blocked)], DOMAIN)
+    slot, kinds = ("unblocked", ("?object",)), (("Mug",), ("Cup",))
+    family = DOMAIN.family(Subtask.parse("pick_up(Mug-1)"))
+    assert counts.in_demonstrations(family, slot, kinds, "true") == (59, 60, 60)
+    assert counts.in_demonstrations(family, slot, kinds, "false") == (0, 60, 60)
+    assert counts.in_demonstrations(family, slot, kinds[:1], "true") == (60, 60, 60)
+
+
 def test_a_task_without_demonstrations_is_judged_by_those_of_others() -> None:
     runs = [run("other", f"b{i}", pick("Mug")) for i in range(3)]
     for task in ("new", None):

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile
 
 import pytest
 
+from forestall import Monitor
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner, explain
 from forestall.domain.model import Domain
@@ -341,3 +343,23 @@ def test_after_putting_something_down_any_counter_will_do() -> None:
     found = diagnose_after("make-salad", "put_on(Lettuce, CounterTop)", f"Lettuce-1 on {other}")
     assert found.must_change == ()
     assert "nothing is violated that held after" in found.cause
+
+
+def test_one_answer_counts_the_same_demonstrations_wherever_it_counts_them() -> None:
+    def seen_with(lid: str, held: str) -> Mapping[str, object]:
+        things = {"cap-1": {}, "jug-1": {}, "box-1": {"lid": lid}, "bin-1": {"lid": "open"}}
+        lying = [f"{x} lies_in tray-1" for x in ("cap-1", "jug-1") if x != held]
+        relations = [*lying, f"{held} held_by gripper"] if held else lying
+        return {"objects": {**things, "tray-1": {}}, "relations": relations}
+
+    twice = [
+        ("put(cap-1, box-1)", seen_with("open", "cap-1")),
+        ("put(jug-1, bin-1)", seen_with("open", "jug-1")),
+        seen_with("open", ""),
+    ]
+    monitor = Monitor.from_demonstrations([twice] * 3)
+    decision = monitor.check(seen_with("shut", "cap-1"), "put(cap-1, box-1)")
+    assert decision.diagnosis is not None
+    assert decision.diagnosis.cause == "box-1 is shut; it was open in all 3 demonstrations"
+    counted = re.findall(r"all (\d+) demonstrations", f"{decision}{decision.sentence}")
+    assert set(counted) == {"3"} and "unlike in all 3 demonstrations (6 uses)" in decision.why

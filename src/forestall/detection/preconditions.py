@@ -288,4 +288,5 @@ def _evidence(violation: Violation) -> str:
     later = f", before {p.skill}, {violation.ahead} steps ahead" if violation.ahead else ""
     if p.expected_by:
         return f"no demonstration, but the language model {p.expected_by} expects it{later}"
-    return f"held in {p.support} of {p.total}{later}"
+    many = "demonstration" if p.total == 1 else "demonstrations"
+    return f"held in {p.support} of {p.total} {many}{later}"
