@@ -14,6 +14,7 @@ from forestall.assembly.sources import demonstrations_from
 from forestall.comparison.needs import Needs
 from forestall.comparison.preconditions import needed
 from forestall.comparison.tally import VARIED, Tally, weight
+from forestall.comparison.unasked import not_judged, unasked
 from forestall.domain.load import shipped
 from forestall.learning.learn import learn
 from forestall.types.demonstration import Demonstration, DemonstrationStep
@@ -134,6 +135,27 @@ def test_what_the_task_makes_of_a_thing_stays_there_unless_it_varied_elsewhere()
     found = mined(varied, "pick_up(Mug-1)", "new")["dirty(?object)=clean"]
     assert found.elsewhere == (0, 4) and found.weight == pytest.approx(weight(4, 4, (0, 4)))
     assert found.kept is Specificity.CATEGORY
+
+
+def test_what_another_task_asks_is_told_where_the_one_at_hand_was_not_shown() -> None:
+    clean = [run(t, f"{t}{i}", pick("Mug", "dirty=clean")) for t in ("a", "b") for i in range(2)]
+    soiled = [run("c", f"c{i}", pick("Mug", "dirty=dirty")) for i in range(2)]
+    step = Subtask.parse("pick_up(Mug-1)")
+    same, mixed = Needs.of(clean, DOMAIN), Needs.of([*clean, *soiled], DOMAIN)
+
+    def tasks(memory: Needs, task: str) -> dict[str, tuple[str, ...]]:
+        return {str(u.precondition.literal): u.tasks for u in unasked(memory, step, task)}
+
+    a_and_b, alone = {"dirty(?object)=clean": ("a", "b")}, {"dirty(?object)=dirty": ("c",)}
+    assert tasks(same, "") == tasks(same, "new") == a_and_b
+    assert tasks(mixed, "") == a_and_b | alone
+    assert tasks(mixed, "new") == tasks(same, "a") == {}
+    assert unasked(same, Subtask.parse("pick_up(Cup-1)"), "") == ()
+    for scene_of, said in (("dirty=dirty", True), ("dirty=clean", False), ("dirty=?", False)):
+        graph = scene(*pick("Mug", scene_of))
+        text = not_judged(unasked(same, step, "new"), graph, step, "new", same)
+        assert text.endswith("in the task new: dirty(Mug-1)=clean, as in a and b") is said
+        assert bool(text) is said
 
 
 def test_what_never_varied_weighs_less_than_what_varied_at_other_times() -> None:

@@ -19,6 +19,7 @@ from forestall.comparison.lacking import Knowledge, lacking, step_of
 from forestall.comparison.needs import Needs
 from forestall.comparison.preconditions import needed
 from forestall.comparison.relevance import counts
+from forestall.comparison.unasked import not_judged, unasked
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.truth import is_shut, truth
 from forestall.records.sentences import in_demonstrations
@@ -33,7 +34,6 @@ from forestall.types.verdict import (
     Reference,
     Verdict,
     Violation,
-    demonstrations_of,
 )
 
 _TOLD = 3
@@ -108,10 +108,10 @@ class SymbolicReasoner:
         preconditions, found = self._known(context) if knows else self._shown(context)
         broken = [v for v in found if v.truth is Truth.FALSE]
         if not broken:
-            count = demonstrations_of(context.references)
+            matters = f"matter {when.value} {subtask.skill}"
             return self._nothing(
-                f"nothing is violated that held {when.value} {subtask.skill} "
-                f"{in_demonstrations(count, count)}{_difference(verdict)}"
+                f"nothing is violated that the demonstrations show to {matters}"
+                f"{self._not_judged(context) if knows else ''}{_difference(verdict)}"
             )
         domain = self.domain
         broken.sort(key=lambda v: _order(v, domain))
@@ -166,6 +166,14 @@ class SymbolicReasoner:
         whole = replace(context, scoped=context.graph)
         found = lacking(whole, mined, self._knowledge, self.domain)
         return mined(context.subtask, step), found
+
+    def _not_judged(self, context: BoundaryContext) -> str:
+        """What does not hold and is asked of other tasks only, as the end of a sentence."""
+        assert self._knowledge is not None
+        memory, subtask, task = self._knowledge.counts(), context.subtask, context.task.name
+        others = unasked(memory, subtask, task)
+        said = not_judged(others, context.graph, subtask, task, memory)
+        return f"; {said}" if said else ""
 
     def _corrected(
         self, mined: Sequence[Precondition], subtask: Subtask, task: str
