@@ -66,7 +66,7 @@ def test_none_fits(observation: Observation) -> None:
     assert verdict.threshold == 0.9
     assert verdict.score is not None
     assert verdict.score < 0.9
-    assert "Pot-1 is blocking Mug-1" in verdict.discrepancies[0].text
+    assert "Pot-1 stands in front of Mug-1" in verdict.discrepancies[0].text
     assert verdict.matches == (("Mug-1", "Mug-1"),)
     assert detector(0.1).judge(seen, observation, [reference(graph("Mug-1"))]).decision is (
         Decision.PROCEED

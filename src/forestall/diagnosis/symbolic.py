@@ -21,6 +21,7 @@ from forestall.comparison.preconditions import needed
 from forestall.comparison.relevance import counts
 from forestall.comparison.unasked import not_judged, unasked
 from forestall.domain.model import LOCATED, Domain
+from forestall.domain.spoken import placing, told
 from forestall.domain.truth import is_shut, truth
 from forestall.records.sentences import in_demonstrations
 from forestall.seams.judging import Expectations
@@ -250,14 +251,7 @@ def explain(
     if predicate == roles.accessible and yes:
         closed = _closed(graph, name, domain)
         return f"{name} is inside {closed}, which is closed; it was open {when}"
-    known = domain.derived.get(predicate)
-    if known is not None and known.words and known.opposite:
-        now = (known.opposite if yes else known.words).format(*literal.args)
-        return f"{now}, unlike {when}"
-    relation = f"{predicate.replace('_', ' ')} {literal.args[-1]}" if literal.args else predicate
-    if literal.value == "false":
-        return f"{name} is {relation}; it was not {when}"
-    return f"{name} is not {relation}; it was {when}"
+    return f"{told(literal, domain, holds=False)}, unlike {when}"
 
 
 def _said(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain, says: str) -> str:
@@ -269,10 +263,7 @@ def _said(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain,
         seen = "in an unknown state" if now is None else domain.say(literal.predicate, now)
         must = domain.say(literal.predicate, literal.value)
         return f"{name} is {seen}; {said} {must} before {subtask.skill}"
-    known = domain.derived.get(literal.predicate)
-    words = None if known is None else known.opposite if literal.value == "true" else known.words
-    now_so = words.format(*literal.args) if words else f"{literal} does not hold"
-    return f"{now_so}; {said} otherwise before {subtask.skill}"
+    return f"{told(literal, domain, holds=False)}; {said} otherwise before {subtask.skill}"
 
 
 def _rank(literal: Literal, domain: Domain) -> int:
@@ -302,7 +293,7 @@ def _listed(graph: SceneGraph, name: str, domain: Domain) -> str:
         "in",
     )
     subjects = " and ".join(contents) or "something"
-    return f"{subjects} {'are' if len(contents) > 1 else 'is'} {relation.replace('_', ' ')}"
+    return f"{subjects} {'are' if len(contents) > 1 else 'is'} {placing(relation, domain)}"
 
 
 def _blockers(graph: SceneGraph, name: str, domain: Domain) -> tuple[str, ...]:
