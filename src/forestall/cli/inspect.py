@@ -110,7 +110,8 @@ def check(
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
         settings: one option of a part; --detector.threshold 0.85 is short for
-            --set detector.threshold=0.85.
+            --set detector.threshold=0.85. Several values of one option stand between commas, and
+            a part without a flag is named the same way: --strategy.name plan-check.
         as_json: print JSON.
     """
     from forestall.assembly.checking import Question, judge_stored

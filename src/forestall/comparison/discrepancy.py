@@ -113,21 +113,19 @@ def _states(
     config: CountedConfig,
     domain: Domain,
 ) -> list[Discrepancy]:
-    wanted = dict(_node(expected, e).states)
-    return [
-        Discrepancy(
-            Change.STATE,
-            o,
-            f"{attribute}={wanted[attribute]}",
-            f"{attribute}={value}",
-            f"{o} is {domain.say(attribute, value)}; "
-            f"the demonstration shows it {domain.say(attribute, wanted[attribute])}",
-        )
-        for attribute, value in _node(observed, o).states
-        if attribute not in config.ignored_attributes
-        and value is not None
-        and wanted.get(attribute) not in (None, value)
-    ]
+    shown = {a: v for a, v in _node(expected, e).states if v is not None}
+    found = []
+    for attribute, value in _node(observed, o).states:
+        wanted = shown.get(attribute)
+        if attribute in config.ignored_attributes or value is None or wanted is None:
+            continue
+        if wanted == value:
+            continue
+        says, said = domain.say(attribute, value), domain.say(attribute, wanted)
+        text = f"{o} is {says}; the demonstration shows it {said}"
+        was, now = f"{attribute}={wanted}", f"{attribute}={value}"
+        found.append(Discrepancy(Change.STATE, o, was, now, text))
+    return found
 
 
 def _extra_objects(
