@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -373,3 +374,35 @@ def test_arguments_and_things_are_in_the_users_words(memory: Path, tmp_path: Pat
     asked = ["check", str(folder), "--memory", str(memory)]
     assert call([*asked, "--subtask", "pick_up(dinner plate)"]) == 0
     assert call([*asked, "--subtask", "pick_up(potted meat can)"]) == 4
+
+
+def test_what_only_a_task_asks_is_judged_by_the_only_one_there_is_and_else_named(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dirty = written(tmp_path / "dirty", PLATE, MUG, Plate_1={"dirty": "dirty"})
+    asked = ["--subtask", STEP, "--memory", str(memory)]
+    needs = ["--detector", "preconditions"]
+    code, told = checked(capsys, [dirty], *asked, *needs)
+    assert (code, told["outcome"], told["task"]) == (1, "hold", "clear-up")
+    assert call(["check", str(dirty), *asked]) == 1
+    assert "judged as the task clear-up, the only one of" in capsys.readouterr().err
+    two = tmp_path / "two.db"
+    with open_store(memory) as store, open_store(two, create=True) as other:
+        for d in store.all():
+            other.add(d)
+            other.add(replace(d, task="lay-table", id=f"{d.id}-again"))
+    asked = ["--subtask", STEP, "--memory", str(two)]
+    code, told = checked(capsys, [dirty], *asked, *needs)
+    assert (code, told["outcome"], told["task"]) == (0, "proceed", None)
+    unjudged = (
+        "not judged, because it depends on the task and no task is named (--task): "
+        "dirty(Plate-1)=clean, as in clear-up and lay-table"
+    )
+    assert told["scenes"][0]["why"] == unjudged
+    code, told = checked(capsys, [dirty], *asked)
+    assert code == 1 and told["scenes"][0]["cause"].startswith(
+        "nothing is violated that the demonstrations show to matter before pick_up; " + unjudged
+    )
+    fine = written(tmp_path / "fine", PLATE, MUG)
+    code, told = checked(capsys, [fine], *asked, *needs)
+    assert (code, told["scenes"][0]["why"]) == (0, "")

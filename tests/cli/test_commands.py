@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from forestall.assembly.sources import demonstrations_from
 from forestall.cli.main import call
+from forestall.memory.store import open_store
 from forestall.types.facts import GRIPPER
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.plan import Subtask
+from stranger import TWELVE
 
 
 def graph_file(folder: Path, name: str, *, bowl: bool) -> str:
@@ -70,6 +73,9 @@ def test_compare_prints_score_and_difference(
         (["run", "heat-potato", "--seed", "-1"], "seed -1"),
         (["run", "heat-potato", "--threshold", "2"], "threshold 2"),
         (["run", "heat-potato", "--sed", "1"], "--seed"),
+        (["check", "x", "--strategy", "watch"], "Name the strategy with --strategy.name NAME."),
+        (["compare", "x", "y", "--strategy", "watch"], "Unknown option: --strategy."),
+        (["scenarios", "--strategy=watch"], "Unknown option: --strategy"),
         (["rnu"], "run"),
         (["tasks", "extra"], "extra"),
         (["compare", "absent.json", "absent.json"], "cannot read scene graph"),
@@ -87,6 +93,19 @@ def test_wrong_input_is_one_clear_line(
     assert printed.err.startswith("forestall: error: ")
     assert printed.err.count("\n") == 1
     assert says in printed.err
+
+
+def test_a_memory_is_listed_with_what_tells_its_demonstrations_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    memory = tmp_path / "pegs.db"
+    with open_store(memory, create=True) as store:
+        for d in demonstrations_from(TWELVE):
+            store.add(d)
+        ids = [d.id for d in store.all()]
+    assert call(["demos", "list", str(memory)]) == 0
+    told = capsys.readouterr().out
+    assert len(ids) == len(set(ids)) == 12 and all(i in told for i in ids)
 
 
 @pytest.mark.parametrize(

@@ -223,6 +223,10 @@ def test_export_as_a_list_and_as_a_domain(
         (["list", "pegs.db", "--task", "t"], "unknown task of pegs.db"),
         (["show", "pegs.db", "insert(peg, lid, driver)"], "unknown subtask of pegs.db"),
         (["show", "pegs.db", "inser(peg)"], "did you mean insert"),
+        (
+            ["show", "pegs.db", "insert"],
+            "with 'forestall preconditions list pegs.db --skill insert'",
+        ),
         (["edit", "pegs.db"], "nothing to correct: give --drop, --add or --undo"),
         (["edit", "pegs.db", "--drop", "surface(hole)"], "write 'skill: fact(?parameter)'"),
         (["edit", "pegs.db", "--drop", "inser: vacant(?hole)"], "did you mean insert"),

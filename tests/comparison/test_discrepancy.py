@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from graph_pairs import (
     BLOCKED,
     CLOSED,
@@ -18,6 +19,7 @@ from graph_pairs import (
 
 from forestall.comparison.score import ScoreConfig, compare
 from forestall.domain.load import shipped
+from forestall.domain.model import Domain
 from forestall.embeddings import HashedTextEncoder
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.verdict import Change, Discrepancy
@@ -26,10 +28,13 @@ DOMAIN = shipped("household")
 
 
 def differences(
-    observed: SceneGraph, expected: SceneGraph, config: ScoreConfig | None = None
+    observed: SceneGraph,
+    expected: SceneGraph,
+    config: ScoreConfig | None = None,
+    domain: Domain = DOMAIN,
 ) -> tuple[Discrepancy, ...]:
     config = config or ScoreConfig()
-    return compare(observed, expected, config, HashedTextEncoder(), DOMAIN).discrepancies
+    return compare(observed, expected, config, HashedTextEncoder(), domain).discrepancies
 
 
 def test_no_differences() -> None:
@@ -65,13 +70,39 @@ def test_a_changed_state_is_a_state_and_not_two_objects() -> None:
 def test_dropped_mug() -> None:
     found = differences(MUG_DROPPED, MUG_HELD)
     assert [d.change for d in found] == [Change.EXTRA_RELATION, Change.MISSING_RELATION]
-    assert "Mug-1 is not held by the gripper (Mug-1 on top of Floor-1)" in found[1].text
+    assert "the gripper does not hold Mug-1 (Mug-1 is on top of Floor-1)" in found[1].text
 
 
 def test_blocked_knife_first() -> None:
     found = differences(BLOCKED, KNIFE)
-    assert found[0].text == "Pot-1 is blocking Knife-1; in the demonstration nothing blocks it"
+    assert found[0].text == (
+        "Pot-1 stands in front of Knife-1; in the demonstration nothing blocks it"
+    )
     assert Change.EXTRA_OBJECT in {d.change for d in found}
+
+
+@pytest.mark.parametrize(
+    ("words", "so", "not_so"),
+    [
+        ("{0} rests on {1}", "Cup-1 rests on Shelf-1", "Cup-1 does not rest on Shelf-1"),
+        ("{1} carries {0}", "Shelf-1 carries Cup-1", "it is not so that Shelf-1 carries Cup-1"),
+        ("", "Cup-1 rests on Shelf-1", "Cup-1 does not rest on Shelf-1"),
+    ],
+)
+def test_a_difference_is_said_in_the_words_of_the_domain(words: str, so: str, not_so: str) -> None:
+    on = replace(DOMAIN.predicates["on_top_of"], name="rests_on", words=words)
+    own = replace(DOMAIN, predicates={**DOMAIN.predicates, "rests_on": on})
+    config = ScoreConfig(predicates=("rests_on",))
+    there, away = scene("Cup-1; Shelf-1", "Cup-1 rests_on Shelf-1"), scene("Cup-1; Shelf-1")
+    (more,) = differences(there, away, config, own)
+    assert more.text == f"{so}; the demonstration does not have it there"
+    (less,) = differences(away, there, config, own)
+    assert less.text == f"{not_so}; the demonstration has it so"
+
+
+def test_a_difference_of_states_is_said_in_the_words_of_the_domain() -> None:
+    (found,) = differences(scene("Mug-1 filled=empty"), scene("Mug-1 filled=water"))
+    assert found.text == "Mug-1 is empty; the demonstration shows it filled with water"
 
 
 def test_missing_things() -> None:

@@ -14,6 +14,7 @@ from forestall.assembly.sources import demonstrations_from
 from forestall.comparison.needs import Needs
 from forestall.comparison.preconditions import needed
 from forestall.comparison.tally import VARIED, Tally, weight
+from forestall.comparison.unasked import not_judged, unasked
 from forestall.domain.load import shipped
 from forestall.learning.learn import learn
 from forestall.types.demonstration import Demonstration, DemonstrationStep
@@ -91,6 +92,25 @@ def test_support_is_told_at_each_level_with_the_one_that_it_was_kept_at() -> Non
     assert (found.kept, found.support, found.total) == (Specificity.PART, 5, 5)
 
 
+def test_a_demonstration_is_counted_once_on_however_many_kinds_a_skill_was_used_in_it() -> None:
+    both = [run("now", f"d{i}", pick("Mug"), pick("Cup")) for i in range(4)]
+    found = mined(both, "pick_up(Mug-1)")["unblocked(?object)"]
+    assert (found.kept, found.support, found.total) == (Specificity.PART, 4, 4)
+    assert [(s.true, s.seen) for s in found.levels] == [(4, 4)] * 3
+    assert found.weight == pytest.approx(weight(8, 8)), "each kind of thing is evidence of its own"
+
+
+def test_what_held_for_one_kind_and_not_for_another_did_not_hold_in_that_demonstration() -> None:
+    blocked = pick("Cup", relations="Pot-1 blocking Cup-1")
+    runs = [run("now", f"d{i}", pick("Mug"), pick("Cup")) for i in range(59)]
+    counts = Needs.of([*runs, run("now", "odd", pick("Mug"), blocked)], DOMAIN)
+    slot, kinds = ("unblocked", ("?object",)), (("Mug",), ("Cup",))
+    family = DOMAIN.family(Subtask.parse("pick_up(Mug-1)"))
+    assert counts.in_demonstrations(family, slot, kinds, "true") == (59, 60, 60)
+    assert counts.in_demonstrations(family, slot, kinds, "false") == (0, 60, 60)
+    assert counts.in_demonstrations(family, slot, kinds[:1], "true") == (60, 60, 60)
+
+
 def test_a_task_without_demonstrations_is_judged_by_those_of_others() -> None:
     runs = [run("other", f"b{i}", pick("Mug")) for i in range(3)]
     for task in ("new", None):
@@ -115,6 +135,27 @@ def test_what_the_task_makes_of_a_thing_stays_there_unless_it_varied_elsewhere()
     found = mined(varied, "pick_up(Mug-1)", "new")["dirty(?object)=clean"]
     assert found.elsewhere == (0, 4) and found.weight == pytest.approx(weight(4, 4, (0, 4)))
     assert found.kept is Specificity.CATEGORY
+
+
+def test_what_another_task_asks_is_told_where_the_one_at_hand_was_not_shown() -> None:
+    clean = [run(t, f"{t}{i}", pick("Mug", "dirty=clean")) for t in ("a", "b") for i in range(2)]
+    soiled = [run("c", f"c{i}", pick("Mug", "dirty=dirty")) for i in range(2)]
+    step = Subtask.parse("pick_up(Mug-1)")
+    same, mixed = Needs.of(clean, DOMAIN), Needs.of([*clean, *soiled], DOMAIN)
+
+    def tasks(memory: Needs, task: str) -> dict[str, tuple[str, ...]]:
+        return {str(u.precondition.literal): u.tasks for u in unasked(memory, step, task)}
+
+    a_and_b, alone = {"dirty(?object)=clean": ("a", "b")}, {"dirty(?object)=dirty": ("c",)}
+    assert tasks(same, "") == tasks(same, "new") == a_and_b
+    assert tasks(mixed, "") == a_and_b | alone
+    assert tasks(mixed, "new") == tasks(same, "a") == {}
+    assert unasked(same, Subtask.parse("pick_up(Cup-1)"), "") == ()
+    for scene_of, said in (("dirty=dirty", True), ("dirty=clean", False), ("dirty=?", False)):
+        graph = scene(*pick("Mug", scene_of))
+        text = not_judged(unasked(same, step, "new"), graph, step, "new", same)
+        assert text.endswith("in the task new: dirty(Mug-1)=clean, as in a and b") is said
+        assert bool(text) is said
 
 
 def test_what_never_varied_weighs_less_than_what_varied_at_other_times() -> None:

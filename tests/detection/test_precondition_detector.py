@@ -82,7 +82,7 @@ def test_only_what_is_behind_the_alarm_lacks() -> None:
 def test_what_was_not_seen_calls_for_another_look() -> None:
     verdict = PreconditionDetector(BENCH).judge(scene(dirty=None), None, FOUR)
     assert verdict.decision is Decision.LOOK_AGAIN
-    assert verdict.note == "not observed: dirt(RoundHole-1)=clean (held in 4 of 4)"
+    assert verdict.note == "not observed: dirt(RoundHole-1)=clean (held in 4 of 4 demonstrations)"
 
 
 def test_one_demonstration_raises_an_alarm_that_says_so() -> None:

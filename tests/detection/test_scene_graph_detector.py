@@ -66,7 +66,7 @@ def test_none_fits(observation: Observation) -> None:
     assert verdict.threshold == 0.9
     assert verdict.score is not None
     assert verdict.score < 0.9
-    assert "Pot-1 is blocking Mug-1" in verdict.discrepancies[0].text
+    assert "Pot-1 stands in front of Mug-1" in verdict.discrepancies[0].text
     assert verdict.matches == (("Mug-1", "Mug-1"),)
     assert detector(0.1).judge(seen, observation, [reference(graph("Mug-1"))]).decision is (
         Decision.PROCEED
@@ -78,7 +78,7 @@ def test_no_reference_is_no_claim(observation: Observation) -> None:
     assert verdict.decision is Decision.PROCEED
     assert verdict.score is None
     assert verdict.calibration is Calibration.UNCALIBRATED
-    assert "no reference above the floor" in verdict.note
+    assert "no demonstration has a subtask similar enough to compare with" in verdict.note
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_a_reference_that_had_not_found_the_argument_cannot_judge(
     assert verdict.decision is Decision.PROCEED
     assert verdict.score is None
     assert verdict.references == 1
-    assert verdict.note == "no reference had found Mug-1 at this point, so nothing was judged"
+    assert verdict.note == "no demonstration had found Mug-1 at this point, so nothing was judged"
     seeing = reference(graph("Mug-1", "Pan-1", "Pot-1"), "seeing")
     verdict = detector().judge(graph("Mug-1", "Sink-1"), observation, [blind, seeing])
     assert verdict.nearest is seeing

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile
 
 import pytest
 
+from forestall import Monitor
 from forestall.comparison.preconditions import mine, violations
 from forestall.diagnosis.symbolic import SymbolicReasoner, explain
 from forestall.domain.model import Domain
@@ -138,7 +140,7 @@ def test_undisturbed_runs_have_nothing_to_change(task: str) -> None:
         graph = seen(state)
         found = REASONER.diagnose(context(task, PLANS[task], index, graph, known[index]), ALARM)
         assert found.must_change == (), f"{subtask}: {found.cause}"
-        assert "nothing is violated that held before" in found.cause
+        assert "nothing is violated that the demonstrations show to matter before" in found.cause
         after = apply(state, subtask)
         assert not isinstance(after, Refusal)
         state = after
@@ -198,7 +200,7 @@ def scripted(lifted: str, ground_fact: str, support: int = 4) -> Diagnosis:
         (
             "not on_top_of(?object, Plate)",
             "not on_top_of(Potato-1, Plate-1)",
-            "Potato-1 is on top of Plate-1; it was not",
+            "Potato-1 is on top of Plate-1, unlike in all 4 demonstrations",
         ),
         ("toggled(?target)=on", "toggled(Faucet-1)=on", "Faucet-1 is off; it was on"),
         ("temperature(?object)=room", "temperature(Mug-1)=room", "Mug-1 is hot; it was at room"),
@@ -340,4 +342,37 @@ def test_after_putting_something_down_any_counter_will_do() -> None:
     other = "CounterTop-2" if wanted.args[1] == "CounterTop-1" else "CounterTop-1"
     found = diagnose_after("make-salad", "put_on(Lettuce, CounterTop)", f"Lettuce-1 on {other}")
     assert found.must_change == ()
-    assert "nothing is violated that held after" in found.cause
+    assert "nothing is violated that the demonstrations show to matter after" in found.cause
+
+
+def test_one_answer_counts_the_same_demonstrations_wherever_it_counts_them() -> None:
+    def seen_with(lid: str, held: str) -> Mapping[str, object]:
+        things = {"cap-1": {}, "jug-1": {}, "box-1": {"lid": lid}, "bin-1": {"lid": "open"}}
+        lying = [f"{x} lies_in tray-1" for x in ("cap-1", "jug-1") if x != held]
+        relations = [*lying, f"{held} held_by gripper"] if held else lying
+        return {"objects": {**things, "tray-1": {}}, "relations": relations}
+
+    twice = [
+        ("put(cap-1, box-1)", seen_with("open", "cap-1")),
+        ("put(jug-1, bin-1)", seen_with("open", "jug-1")),
+        seen_with("open", ""),
+    ]
+    monitor = Monitor.from_demonstrations([twice] * 3)
+    decision = monitor.check(seen_with("shut", "cap-1"), "put(cap-1, box-1)")
+    assert decision.diagnosis is not None
+    assert decision.diagnosis.cause == "box-1 is shut; it was open in all 3 demonstrations"
+    counted = re.findall(r"all (\d+) demonstrations", f"{decision}{decision.sentence}")
+    assert set(counted) == {"3"} and "unlike in all 3 demonstrations (6 uses)" in decision.why
+
+
+def test_what_is_in_the_way_is_said_where_a_relation_is_a_verb() -> None:
+    def tray(*relations: str) -> Mapping[str, object]:
+        return {"objects": ["cap-1", "jug-1", "box-1", "tray-1"], "relations": list(relations)}
+
+    free = tray("cap-1 held_by gripper", "jug-1 lies_in tray-1")
+    done = tray("cap-1 lies_in box-1", "jug-1 lies_in tray-1")
+    monitor = Monitor.from_demonstrations([[("put(cap-1, box-1)", free), done]] * 3)
+    full = tray("cap-1 held_by gripper", "jug-1 lies_in box-1")
+    decision = monitor.check(full, "put(cap-1, box-1)")
+    assert decision.diagnosis is not None
+    assert decision.diagnosis.cause.startswith("jug-1 is lying in box-1, which is empty in all 3")

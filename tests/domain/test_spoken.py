@@ -3,7 +3,7 @@
 import pytest
 
 from forestall.domain.load import shipped
-from forestall.domain.spoken import Spoken, listed, plural, sentence
+from forestall.domain.spoken import Spoken, listed, plural, sentence, told
 from forestall.types.facts import Literal
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
@@ -123,6 +123,21 @@ def test_a_domain_that_was_learnt_is_said_by_its_names() -> None:
     assert words.step(Subtask.parse("insert(peg-1, tray-1)")) == (
         'do "insert" with the peg and the tray'
     )
+
+
+@pytest.mark.parametrize(
+    ("fact", "holds", "not_so"),
+    [
+        ("inside(Cup-1, Fridge-1)", "Cup-1 is inside Fridge-1", "Cup-1 is not inside Fridge-1"),
+        ("not inside(Cup-1, Sink-1)", "Cup-1 is not inside Sink-1", "Cup-1 is inside Sink-1"),
+        ("held_by(Cup-1, gripper)", "the gripper holds Cup-1", "the gripper does not hold Cup-1"),
+        ("lies_in(peg-1, tray-1)", "peg-1 lies in tray-1", "peg-1 does not lie in tray-1"),
+        ("near(Cup-1, gripper)", "Cup-1 is near the gripper", "Cup-1 is not near the gripper"),
+    ],
+)
+def test_things_may_keep_their_names(fact: str, holds: str, not_so: str) -> None:
+    literal = Literal.parse(fact)
+    assert (told(literal, HOUSEHOLD), told(literal, HOUSEHOLD, False)) == (holds, not_so)
 
 
 def test_sentences_and_lists() -> None:

@@ -74,7 +74,7 @@ def test_the_learnt_skills_run() -> None:
     assert state.place("peg-1") is not None
     again = apply(state, Subtask.parse("insert(peg-1, hole-1, driver-1)"))
     assert isinstance(again, Refusal)
-    assert again.reason == "peg-1 not held by gripper, unlike in all 12 demonstrations"
+    assert again.reason == "peg-1 is not held by gripper, unlike in all 12 demonstrations"
 
 
 def test_a_draft_is_written_and_read_back() -> None:

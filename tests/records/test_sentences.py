@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from forestall.records.sentences import in_sentences
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.facts import Literal
@@ -135,8 +137,9 @@ def test_what_is_held_and_what_is_lost() -> None:
     )
 
 
-def test_what_was_not_seen_is_said_so() -> None:
-    note = "not observed: open(Microwave-1)=open (held in 4 of 4), Plate-1"
+@pytest.mark.parametrize("counted", ["4 of 4", "4 of 4 demonstrations", "1 of 1 demonstration"])
+def test_what_was_not_seen_is_said_so(counted: str) -> None:
+    note = f"not observed: open(Microwave-1)=open (held in {counted}), Plate-1"
     verdict = replace(said(Decision.LOOK_AGAIN), note=note)
     at = before()
     decision = MonitorDecision(Outcome.LOOK, False, at.subtask, verdict=verdict)

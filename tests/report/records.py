@@ -298,7 +298,7 @@ def troubled_record() -> EpisodeRecord:
         None,
         0.9,
         Calibration.UNCALIBRATED,
-        note="no reference above the floor <0.5>",
+        note="no demonstration is like it <0.5>",
     )
     second = replace(
         boundary(1, Subtask("pick_up", (odd,))), verdict=alone, graph=graph, scoped=graph

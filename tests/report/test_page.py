@@ -180,7 +180,7 @@ def test_alarms_that_changed_nothing_and_a_scene_without_reference() -> None:
     text = page(records.troubled_record()).text
     assert "nothing was found that must change: the difference is harmless" in text
     assert "The plan stayed as it was: unsolvable (proven on the observed state)." in text
-    assert "no reference above the floor <0.5>" in text
+    assert "no demonstration is like it <0.5>" in text
     assert "step 2 cannot run: no room <left>" in text
     assert "Not scored" in text
     assert "uncalibrated" in text

@@ -230,8 +230,8 @@ def _task(
 ) -> tuple[Task, Domain, tuple[str, ...]]:
     """The task with the plan at hand, its domain, and what a learnt one cannot know.
 
-    A plan of no task is of the one that all demonstrations are of, if there is one. A subtask that
-    the task's own plan does not have is judged alone, without the task's goal.
+    A plan or a subtask of no task is of the one that all demonstrations are of, if there is one. A
+    subtask that the task's own plan does not have is judged alone, without the task's goal.
     """
     limits: tuple[str, ...] = ()
     if question.task is None:
@@ -241,7 +241,7 @@ def _task(
             domain, limits = own.domain, own.limits
         title = f"before {question.subtask}" if question.subtask else "a plan"
         shown = {d.task for d in demonstrations or ()}
-        name = shown.pop() if question.plan is not None and len(shown) == 1 else ""
+        name = shown.pop() if len(shown) == 1 else ""
         task = Task(name, title, Goal(""), Plan(()), SceneNeeds(), domain.name)
     else:
         loaded = config.load()

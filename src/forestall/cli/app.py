@@ -18,7 +18,7 @@ from forestall.cli.doctor import doctor
 from forestall.cli.domain import domain
 from forestall.cli.encoder import encoder
 from forestall.cli.examples import EXAMPLES
-from forestall.cli.flags import spelt
+from forestall.cli.flags import spelt, unknown_option
 from forestall.cli.importing import import_
 from forestall.cli.inspect import check, compare
 from forestall.cli.listing import scenarios, tasks
@@ -92,6 +92,8 @@ def answer(arguments: Sequence[str]) -> int:
             print_error=False,
             result_action="return_value",
         )
+    except cyclopts.UnknownOptionError as error:
+        raise InputError(unknown_option(error)) from error
     except cyclopts.CycloptsError as error:
         raise InputError(str(error)) from error
     return code if isinstance(code, int) else 0

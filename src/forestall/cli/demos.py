@@ -221,9 +221,16 @@ def list_(memory: Path | None = None, /, *, as_json: Json = False) -> int:
     from forestall.cli.listing import print_table
 
     print_table(
-        ("task", "scene", "steps", "states from", "memory"),
+        ("id", "task", "scene", "steps", "states from", "memory"),
         [
-            (r["task"], r["scene"], str(r["steps"]), r.get("state_estimator", ""), r["memory"])
+            (
+                r["id"],
+                r["task"],
+                r["scene"],
+                str(r["steps"]),
+                r.get("state_estimator", ""),
+                r["memory"],
+            )
             for r in rows
         ],
     )

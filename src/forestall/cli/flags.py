@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Parameter, UnknownOptionError
 
 if TYPE_CHECKING:
     from forestall.assembly.configuration import Given
@@ -52,7 +52,8 @@ class SeeingFlags:
         captioner: of whole pictures, for the detector caption: listing or blip.
         config: a TOML file with a table for each kind of part; flags come over it.
         settings: one option of a part; --detector.threshold 0.85 is short for
-            --set detector.threshold=0.85 (see `forestall parts`).
+            --set detector.threshold=0.85 (see `forestall parts`). Several values of one option
+            stand between commas: --strategy.judges score,plan-check.
     """
 
     world: str | None = None
@@ -173,3 +174,16 @@ def spelt(arguments: Iterable[str]) -> Iterator[str]:
             yield f"{found[1]}={found[2]}"
     if waiting is not None:
         yield waiting
+
+
+def unknown_option(error: UnknownOptionError) -> str:
+    """What is said of a flag that a command lacks: a kind of part is named with `--kind.name`."""
+    from forestall import kinds
+    from forestall.types.kind import Kind
+
+    flag = (error.token.keyword or error.token.value).partition("=")[0]
+    known = {k.name for k in vars(kinds).values() if isinstance(k, Kind)}
+    takes_parts = any(a.field_info.name == "settings" for a in error.argument_collection)
+    if takes_parts and flag.removeprefix("--") in known:
+        return f"Unknown option: {flag}. Name the {flag[2:]} with {flag}.name NAME."
+    return str(error)

@@ -97,7 +97,8 @@ def check(
         subtask: what is about to start, e.g. "put_in(Plate, Microwave)". Without it the scenes are
             judged before the subtasks of the plan, one after the other.
         plan: "STEP; STEP", or a file with one step a line; the task's by default.
-        task: the task's name, so that its own demonstrations are preferred.
+        task: the task's name or file, so that its own demonstrations are preferred and what it asks
+            of things is judged; by default the one that all demonstrations of the memory are of.
         page: an HTML file to write about it.
         explain: a picture to write of what was understood: masks with their names, the scene from
             above; also of what is refused.
@@ -109,7 +110,8 @@ def check(
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
         settings: one option of a part; --detector.threshold 0.85 is short for
-            --set detector.threshold=0.85.
+            --set detector.threshold=0.85. Several values of one option stand between commas, and
+            a part without a flag is named the same way: --strategy.name plan-check.
         as_json: print JSON.
     """
     from forestall.assembly.checking import Question, judge_stored
@@ -155,6 +157,12 @@ def check(
         print(
             f"forestall: the domain is learnt from {path}; what it cannot know: "
             "'forestall domain learn'",
+            file=sys.stderr,
+        )
+    if task is None and found.record.task.name:
+        print(
+            f"forestall: judged as the task {found.record.task.name}, the only one of {path}; "
+            "--task names another",
             file=sys.stderr,
         )
     if found.eyes:

@@ -94,7 +94,7 @@ def show(
 
     Args:
         memory: a demonstration file.
-        subtask: e.g. "insert(peg-1, hole-1)"; categories will do.
+        subtask: e.g. "insert(peg-1, hole-1)"; categories will do. Of a whole skill see `list`.
         task: at hand; that of the first demonstration with such a subtask by default.
         domain: see `list`.
         as_json: print JSON.
@@ -102,9 +102,19 @@ def show(
     from forestall.assembly.mined import remembered, shown
     from forestall.assembly.plans import fitting
     from forestall.cli.listing import say
+    from forestall.errors import InputError
     from forestall.types.plan import Subtask
 
+    subtask = subtask.strip()
     known = remembered(memory, given_domain(domain))
+    if subtask in known.skills:
+        shown_as = next(
+            s.subtask for d in known.demonstrations for s in d.steps if s.subtask.skill == subtask
+        )
+        raise InputError(
+            f"{subtask} is a skill: give a subtask, as {shown_as}, or see all that is mined before "
+            f"it with 'forestall preconditions list {memory} --skill {subtask}'"
+        )
     wanted = fitting(Subtask.parse(subtask), known.domain)
     found = shown(known, wanted, task)
     tell_stale(known)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 from forestall.comparison.options import CountedConfig
 from forestall.domain.model import Domain
+from forestall.domain.spoken import told
 from forestall.domain.truth import truth
-from forestall.types.facts import GRIPPER, Literal, Truth
+from forestall.types.facts import Literal, Truth
 from forestall.types.graph import ObjectNode, Relation, SceneGraph
 from forestall.types.verdict import Change, Discrepancy
 
@@ -48,7 +49,7 @@ def differences(
         expected: the graph of a demonstration.
         matches: (observed id, expected id).
         config: which relations, states and categories count.
-        domain: what the relations are.
+        domain: what the relations are, and the words for them.
     """
     changed = _changed_pairs(observed, expected, matches, config)
     pairs = [*matches, *changed]
@@ -56,16 +57,17 @@ def differences(
     pairing = _Pairing(
         dict(pairs), {e: o for o, e in pairs}, frozenset(config.supports if merged else ())
     )
-    found = [d for o, e in pairs for d in _states(observed, expected, o, e, config)]
+    found = [d for o, e in pairs for d in _states(observed, expected, o, e, config, domain)]
     found += _extra_objects(observed, expected, pairing)
     found += _missing_objects(observed, expected, pairing)
     found += _extra_relations(observed, expected, pairing, config, domain)
     found += _missing_relations(observed, expected, pairing, config, domain)
     arguments = () if observed.subtask is None else observed.subtask.args
 
-    def key(d: Discrepancy) -> tuple[bool, int, str, str]:
+    def key(d: Discrepancy) -> tuple[bool, int, str, str, str]:
         concerned = any(a in (d.subject, *d.text.split()) for a in arguments)
-        return (not concerned, _ORDER[d.change], d.subject, d.text)
+        what = d.expected if d.change is Change.MISSING_RELATION else d.observed
+        return (not concerned, _ORDER[d.change], d.subject, what, d.text)
 
     return tuple(sorted(found, key=key))
 
@@ -104,22 +106,26 @@ def _node(graph: SceneGraph, node_id: str) -> ObjectNode:
 
 
 def _states(
-    observed: SceneGraph, expected: SceneGraph, o: str, e: str, config: CountedConfig
+    observed: SceneGraph,
+    expected: SceneGraph,
+    o: str,
+    e: str,
+    config: CountedConfig,
+    domain: Domain,
 ) -> list[Discrepancy]:
-    wanted = dict(_node(expected, e).states)
-    return [
-        Discrepancy(
-            Change.STATE,
-            o,
-            f"{attribute}={wanted[attribute]}",
-            f"{attribute}={value}",
-            f"{o} is {value}; the demonstration shows it {wanted[attribute]}",
-        )
-        for attribute, value in _node(observed, o).states
-        if attribute not in config.ignored_attributes
-        and value is not None
-        and wanted.get(attribute) not in (None, value)
-    ]
+    shown = {a: v for a, v in _node(expected, e).states if v is not None}
+    found = []
+    for attribute, value in _node(observed, o).states:
+        wanted = shown.get(attribute)
+        if attribute in config.ignored_attributes or value is None or wanted is None:
+            continue
+        if wanted == value:
+            continue
+        says, said = domain.say(attribute, value), domain.say(attribute, wanted)
+        text = f"{o} is {says}; the demonstration shows it {said}"
+        was, now = f"{attribute}={wanted}", f"{attribute}={value}"
+        found.append(Discrepancy(Change.STATE, o, was, now, text))
+    return found
 
 
 def _extra_objects(
@@ -198,9 +204,8 @@ def _extra_relations(
         if (subject, r.predicate, target) in wanted:
             continue
         there = _what_was_there(expected, r, target, domain)
-        found.append(
-            Discrepancy(Change.EXTRA_RELATION, r.subject, there, str(r), f"{_sentence(r)}; {there}")
-        )
+        text = f"{_sentence(r, domain)}; {there}"
+        found.append(Discrepancy(Change.EXTRA_RELATION, r.subject, there, str(r), text))
     return found
 
 
@@ -251,26 +256,23 @@ def _missing_relations(
 def _what_is_here(observed: SceneGraph, expected: Relation, domain: Domain) -> tuple[str, str]:
     literal = Literal(expected.predicate, (expected.subject, expected.object))
     if observed.get(expected.subject) is None:
-        return f"in the demonstration {_sentence(expected)}", "not seen"
+        return f"in the demonstration {_sentence(expected, domain)}", "not seen"
     if truth(observed, literal, domain) is Truth.UNOBSERVED:
         return (
-            f"whether {_sentence(expected)} could not be seen; the demonstration has it so",
+            f"whether {_sentence(expected, domain)} could not be seen; the demonstration has it so",
             "unobserved",
         )
     telling = (*domain.containing, domain.roles.holding)
     places = [
-        str(r)
-        for r in observed.relations
-        if r.subject == expected.subject and r.predicate in telling
+        r for r in observed.relations if r.subject == expected.subject and r.predicate in telling
     ]
-    now = f" ({', '.join(places)})" if places else ""
+    now = f" ({', '.join(_sentence(r, domain) for r in places)})" if places else ""
     return (
-        f"{_sentence(expected, negative=True)}{now}; the demonstration has it so",
-        ", ".join(places),
+        f"{_sentence(expected, domain, holds=False)}{now}; the demonstration has it so",
+        ", ".join(map(str, places)),
     )
 
 
-def _sentence(relation: Relation, negative: bool = False) -> str:
-    words = "is not" if negative else "is"
-    target = "the gripper" if relation.object == GRIPPER else relation.object
-    return f"{relation.subject} {words} {relation.predicate.replace('_', ' ')} {target}"
+def _sentence(relation: Relation, domain: Domain, holds: bool = True) -> str:
+    literal = Literal(relation.predicate, (relation.subject, relation.object))
+    return told(literal, domain, holds)

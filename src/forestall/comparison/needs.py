@@ -8,12 +8,16 @@ that run alone, so that it costs the same in a memory of any size. Counted are, 
 - for the same kinds of things at all other times, which values it had then;
 - after each skill which values it had, and whether it had another before;
 - what is about no argument only before the same step of the same task.
+
+Where several kinds of things are taken together, one demonstration may have used a skill on more
+than one of them. Weights count it once for each kind; what is told counts it once
+(`Needs.in_demonstrations`).
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from forestall.comparison.lifting import Kind, candidates, evaluate, kind_of
@@ -78,6 +82,9 @@ class Needs:
         self.before: dict[str, dict[Slot, _ByKinds]] = {}
         self.forms: dict[str, dict[Slot, set[str]]] = {}
         self.uses: dict[tuple[str, tuple[str, ...]], dict[Kinds, dict[str, int]]] = {}
+        # runs as the bits of a number, so that sets of them are cheap to keep and to join
+        self.had: dict[tuple[str, Slot], dict[Kinds, dict[str, int]]] = {}
+        self.users: dict[tuple[str, tuple[str, ...]], dict[Kinds, int]] = {}
         self.here: dict[tuple[str, Kinds, str, int], Here] = {}
         self.all_times: dict[tuple[Slot, Kinds], Tally] = {}
         self.less_own: dict[tuple[str, Slot, Kinds], Tally] = {}
@@ -119,6 +126,7 @@ class Needs:
             together: whether they are the whole run, so that each is another time to the others.
         """
         moments = [m for m in moments if self._known(m.subtask)]
+        own = 1 << self.runs
         self.runs += 1
         values: _Values = {}
         used: set[tuple[str, tuple[str, ...], Kinds, str]] = set()
@@ -126,9 +134,14 @@ class Needs:
         for (family, slot, kinds, task), found in values.items():
             by_kinds = self.before.setdefault(family, {}).setdefault(slot, {})
             by_kinds.setdefault(kinds, {}).setdefault(task, Tally()).add(found)
+            had = self.had.setdefault((family, slot), {}).setdefault(kinds, {})
+            for value in found:
+                had[value] = had.get(value, 0) | own
         for family, variables, kinds, task in used:
             by_task = self.uses.setdefault((family, variables), {}).setdefault(kinds, {})
             by_task[task] = by_task.get(task, 0) + 1
+            users = self.users.setdefault((family, variables), {})
+            users[kinds] = users.get(kinds, 0) | own
         self._effects(moments, asked)
         if together:
             self._other_times(moments, asked)
@@ -147,6 +160,33 @@ class Needs:
         total = self.all_times.get((shape(slot), kinds), Tally())
         own = self.less_own.get((family, slot, kinds))
         return total if own is None else total.plus(own)
+
+    def in_demonstrations(
+        self, family: str, slot: Slot, kinds: Collection[Kinds], value: str
+    ) -> tuple[int, int, int]:
+        """How many demonstrations show a fact before a skill, each counted once.
+
+        Args:
+            family: of the skill.
+            slot: the fact.
+            kinds: of things, taken together.
+            value: of the fact.
+
+        Returns:
+            Those in which it had this value alone, those in which it was observed, those in which
+            the skill was used on such things.
+        """
+        had = self.had.get((family, slot), {})
+        users = self.users.get((family, variables_of(slot)), {})
+        so = otherwise = used = 0
+        for k in kinds:
+            used |= users.get(k, 0)
+            for v, runs in had.get(k, {}).items():
+                if v == value:
+                    so |= runs
+                else:
+                    otherwise |= runs
+        return (so & ~otherwise).bit_count(), (so | otherwise).bit_count(), used.bit_count()
 
     def brings_about(self, subtask: Subtask) -> frozenset[Literal]:
         """What was so after every demonstrated use of a skill, and not before at least one."""

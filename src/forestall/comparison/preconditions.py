@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from forestall.comparison.implied import said_once
 from forestall.comparison.lifting import Kind, evaluate, kind_of, lift
@@ -189,6 +190,7 @@ class _Asked:
         by_kinds = counts.before[family][slot]
         uses = counts.uses[family, variables_of(slot)]
         parts = [k for k in by_kinds if same_part(counts, subtask, slot, own, k)]
+        self._shown = partial(counts.in_demonstrations, family, slot, parts)
         mine = by_kinds.get(own, {})
         self._tasks = len(mine)
         self._tallies = {
@@ -221,21 +223,33 @@ class _Asked:
         if weights[levels[0]] <= _EVEN:
             return None  # the narrowest speaks against it
         best = max(levels, key=lambda x: (round(weights[x], 6), -levels.index(x)))
-        true, most = self._tallies[best].always(value), self._uses[best]
-        if true < max(1, min(self._config.minimum_support, most)):
+        held = self._tallies[best].always(value)
+        if held < max(1, min(self._config.minimum_support, self._uses[best])):
             return None
         if self._foreign(kind) and not self._carries(best, weights[best], value, said):
             return None
         return Precondition(
             self._subtask.skill,
             literal,
-            true,
-            most,
+            *self._support(best, value),
             weights[best],
             best,
-            tuple(Support(x, t.always(value), t.seen) for x, t in self._tallies.items()),
+            tuple(Support(x, *self._seen(x, value)) for x in self._tallies),
             self._elsewhere[best].ever(value),
         )
+
+    def _support(self, level: Specificity, value: str) -> tuple[int, int]:
+        """Demonstrations in which it held, and those that used the skill, each counted once."""
+        if level is Specificity.PART:
+            held, _, used = self._shown(value)
+            return held, used
+        return self._tallies[level].always(value), self._uses[level]
+
+    def _seen(self, level: Specificity, value: str) -> tuple[int, int]:
+        """Demonstrations in which it held, and those in which it was observed."""
+        if level is Specificity.PART:
+            return self._shown(value)[:2]
+        return self._tallies[level].always(value), self._tallies[level].seen
 
     def _levels(self, kind: Kind, value: str, said: bool) -> list[Specificity]:
         """Levels that have a say and were observed, the narrowest first."""

@@ -19,6 +19,7 @@ from forestall.comparison.expectations import NoExpectations, shown
 from forestall.comparison.lacking import Knowledge, lacking, step_of
 from forestall.comparison.preconditions import MiningConfig, mine, needed, violations
 from forestall.comparison.relevance import counts
+from forestall.comparison.unasked import Unasked, not_judged, unasked
 from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
 from forestall.domain.model import Domain
 from forestall.errors import InputError
@@ -75,7 +76,8 @@ class PreconditionDetector:
     - a precondition is violated whose weight the threshold asks for: replan;
     - none is, but one could not be observed, or an argument has a relation that the domain does
       not know: look again, because what was not seen or not known is neither;
-    - all hold: proceed;
+    - all hold: proceed; a note says what other tasks ask and does not hold, where nobody has shown
+      such a subtask in the task at hand;
     - nothing was mined: proceed without a score and with a note; nothing was judged.
 
     Args:
@@ -112,11 +114,12 @@ class PreconditionDetector:
         self._thresholds = thresholds
         self._corrections = corrections
         self._mined: dict[object, tuple[Precondition, ...]] = {}
+        self._unasked: dict[object, tuple[Unasked, ...]] = {}
 
     def knowing(self, knowledge: Knowledge) -> PreconditionDetector:
         """The same detector with another memory."""
         other = copy(self)
-        other._knowledge, other._mined = knowledge, {}
+        other._knowledge, other._mined, other._unasked = knowledge, {}, {}
         return other
 
     def judge(
@@ -173,6 +176,8 @@ class PreconditionDetector:
         if not mined and not found:
             note = f"nothing always held before {subtask.skill}, so nothing was judged"
             note = note if references else NO_REFERENCE
+            if left := self._not_judged(knowledge, observed, subtask, context):
+                note = f"{note}; {left}"
             return self._verdict(Decision.PROCEED, None, references, note)
         false = [v for v in found if v.truth is Truth.FALSE]
         score = 1.0 - max((weight(v) for v in false), default=0.0)
@@ -195,7 +200,8 @@ class PreconditionDetector:
             return self._verdict(Decision.LOOK_AGAIN, score, references, note)
         models = dict.fromkeys(p.expected_by for p in mined if p.expected_by)
         if not models:
-            return self._verdict(Decision.PROCEED, score, references)
+            note = self._not_judged(knowledge, observed, subtask, context)
+            return self._verdict(Decision.PROCEED, score, references, note)
         by = " and ".join(models)
         note = f"no demonstration of it; it is as the language model {by} expects"
         return replace(self._verdict(Decision.PROCEED, score, references, note), expected_by=by)
@@ -208,6 +214,24 @@ class PreconditionDetector:
             if r.predicate not in self._domain.predicates
             and (r.subject in subtask.args or r.object in subtask.args)
         ]
+
+    def _not_judged(
+        self,
+        knowledge: Knowledge | None,
+        observed: SceneGraph,
+        subtask: Subtask,
+        context: BoundaryContext | None,
+    ) -> str:
+        """What another task asks and does not hold here; "" where there is nothing of the kind."""
+        if knowledge is None or context is None:
+            return ""
+        memory, task = knowledge.counts(), context.task.name
+        key = (subtask.skill, tuple(memory.kinds(subtask).values()), task, memory.runs)
+        if key not in self._unasked:
+            if len(self._unasked) >= _KEPT:
+                self._unasked.clear()
+            self._unasked[key] = unasked(memory, subtask, task, self._mining)
+        return not_judged(self._unasked[key], observed, subtask, task, memory)
 
     def _preconditions(
         self, references: Sequence[Reference], subtask: Subtask
@@ -288,4 +312,5 @@ def _evidence(violation: Violation) -> str:
     later = f", before {p.skill}, {violation.ahead} steps ahead" if violation.ahead else ""
     if p.expected_by:
         return f"no demonstration, but the language model {p.expected_by} expects it{later}"
-    return f"held in {p.support} of {p.total}{later}"
+    many = "demonstration" if p.total == 1 else "demonstrations"
+    return f"held in {p.support} of {p.total} {many}{later}"

@@ -24,8 +24,10 @@ from forestall.types.verdict import (
     scenes,
 )
 
-NO_REFERENCE = "no reference above the floor: nothing to compare with, so nothing was judged"
-NOT_COMPARABLE = "no reference had found {} at this point, so nothing was judged"
+NO_REFERENCE = (
+    "no demonstration has a subtask similar enough to compare with, so nothing was judged"
+)
+NOT_COMPARABLE = "no demonstration had found {} at this point, so nothing was judged"
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,9 @@ from forestall.comparison.lacking import Knowledge, lacking, step_of
 from forestall.comparison.needs import Needs
 from forestall.comparison.preconditions import needed
 from forestall.comparison.relevance import counts
+from forestall.comparison.unasked import not_judged, unasked
 from forestall.domain.model import LOCATED, Domain
+from forestall.domain.spoken import placing, told
 from forestall.domain.truth import is_shut, truth
 from forestall.records.sentences import in_demonstrations
 from forestall.seams.judging import Expectations
@@ -33,7 +35,6 @@ from forestall.types.verdict import (
     Reference,
     Verdict,
     Violation,
-    demonstrations_of,
 )
 
 _TOLD = 3
@@ -108,10 +109,10 @@ class SymbolicReasoner:
         preconditions, found = self._known(context) if knows else self._shown(context)
         broken = [v for v in found if v.truth is Truth.FALSE]
         if not broken:
-            count = demonstrations_of(context.references)
+            matters = f"matter {when.value} {subtask.skill}"
             return self._nothing(
-                f"nothing is violated that held {when.value} {subtask.skill} "
-                f"{in_demonstrations(count, count)}{_difference(verdict)}"
+                f"nothing is violated that the demonstrations show to {matters}"
+                f"{self._not_judged(context) if knows else ''}{_difference(verdict)}"
             )
         domain = self.domain
         broken.sort(key=lambda v: _order(v, domain))
@@ -166,6 +167,14 @@ class SymbolicReasoner:
         whole = replace(context, scoped=context.graph)
         found = lacking(whole, mined, self._knowledge, self.domain)
         return mined(context.subtask, step), found
+
+    def _not_judged(self, context: BoundaryContext) -> str:
+        """What does not hold and is asked of other tasks only, as the end of a sentence."""
+        assert self._knowledge is not None
+        memory, subtask, task = self._knowledge.counts(), context.subtask, context.task.name
+        others = unasked(memory, subtask, task)
+        said = not_judged(others, context.graph, subtask, task, memory)
+        return f"; {said}" if said else ""
 
     def _corrected(
         self, mined: Sequence[Precondition], subtask: Subtask, task: str
@@ -242,14 +251,7 @@ def explain(
     if predicate == roles.accessible and yes:
         closed = _closed(graph, name, domain)
         return f"{name} is inside {closed}, which is closed; it was open {when}"
-    known = domain.derived.get(predicate)
-    if known is not None and known.words and known.opposite:
-        now = (known.opposite if yes else known.words).format(*literal.args)
-        return f"{now}, unlike {when}"
-    relation = f"{predicate.replace('_', ' ')} {literal.args[-1]}" if literal.args else predicate
-    if literal.value == "false":
-        return f"{name} is {relation}; it was not {when}"
-    return f"{name} is not {relation}; it was {when}"
+    return f"{told(literal, domain, holds=False)}, unlike {when}"
 
 
 def _said(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain, says: str) -> str:
@@ -261,10 +263,7 @@ def _said(literal: Literal, graph: SceneGraph, subtask: Subtask, domain: Domain,
         seen = "in an unknown state" if now is None else domain.say(literal.predicate, now)
         must = domain.say(literal.predicate, literal.value)
         return f"{name} is {seen}; {said} {must} before {subtask.skill}"
-    known = domain.derived.get(literal.predicate)
-    words = None if known is None else known.opposite if literal.value == "true" else known.words
-    now_so = words.format(*literal.args) if words else f"{literal} does not hold"
-    return f"{now_so}; {said} otherwise before {subtask.skill}"
+    return f"{told(literal, domain, holds=False)}; {said} otherwise before {subtask.skill}"
 
 
 def _rank(literal: Literal, domain: Domain) -> int:
@@ -294,7 +293,7 @@ def _listed(graph: SceneGraph, name: str, domain: Domain) -> str:
         "in",
     )
     subjects = " and ".join(contents) or "something"
-    return f"{subjects} {'are' if len(contents) > 1 else 'is'} {relation.replace('_', ' ')}"
+    return f"{subjects} {'are' if len(contents) > 1 else 'is'} {placing(relation, domain)}"
 
 
 def _blockers(graph: SceneGraph, name: str, domain: Domain) -> tuple[str, ...]:

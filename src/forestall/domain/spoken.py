@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.phrases import with_articles
-from forestall.types.facts import Literal, category_of, is_instance
+from forestall.types.facts import GRIPPER, Literal, category_of, is_instance
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
 
@@ -136,11 +136,7 @@ class Spoken:
 
     def place(self, relation: str, place: str) -> str:
         """Where a thing is that has a relation to a place: "inside the microwave"."""
-        words = self._words(relation, 2)
-        verb = None if words.startswith("{0} is ") else _VERB.match(words)
-        if verb is not None:
-            words = f"{verb[1]} is {_participle(_infinitive(verb[2]))}{words[verb.end() :]}"
-        return f"{words.removeprefix('{0} is ').removesuffix(' {1}')} {self.the(place)}"
+        return f"{placing(relation, self.domain)} {self.the(place)}"
 
     def _pattern(self, literal: Literal, holds: bool) -> str:
         """The clause with {0}, {1} for the things."""
@@ -153,23 +149,7 @@ class Spoken:
             return "I know where {0} is" if holds else "I do not know where {0} is"
         if predicate == roles.holding:
             return "I am holding {0}" if holds else "I am not holding {0}"
-        words = self._words(predicate, len(literal.args))
-        if holds:
-            return words
-        known = self.domain.predicates.get(predicate)
-        opposite = "" if known is None else known.opposite
-        return opposite or _denied(words)
-
-    def _words(self, predicate: str, arity: int) -> str:
-        known = self.domain.predicates.get(predicate)
-        if known is not None and known.words:
-            return known.words
-        plain = _plain(predicate)
-        if arity == 0:
-            return f"it is so that {plain}"
-        others = " and ".join(f"{{{k}}}" for k in range(1, arity))
-        says = plain if plain.split()[0].endswith("s") and arity > 1 else f"is {plain}"
-        return f"{{0}} {says} {others}".rstrip()
+        return _related(predicate, len(literal.args), holds, self.domain)
 
     def _filled(
         self, pattern: str, literal: Literal, called: Mapping[str, str] | None = None
@@ -239,6 +219,50 @@ class Spoken:
         return _CAMEL.sub(kind, _INSTANCE.sub(thing, said))
 
 
+def told(literal: Literal, domain: Domain, holds: bool = True) -> str:
+    """A fact, or that it does not hold, of things by their names: "Vial-1 rests on Bench-1"."""
+    holds = holds == (literal.value == "true")
+    pattern = _related(literal.predicate, len(literal.args), holds, domain)
+    names = {
+        str(k): f"the {_plain(a)}" if a in domain.robot.hands or a == GRIPPER else a
+        for k, a in enumerate(literal.args)
+    }
+    return _SLOT.sub(lambda match: names.get(match[1], "something"), pattern)
+
+
+def placing(relation: str, domain: Domain) -> str:
+    """What stands before a place, after "is": "inside", "on top of", "resting on"."""
+    words = _words(relation, 2, domain)
+    verb = None if words.startswith("{0} is ") else _VERB.match(words)
+    if verb is not None:
+        words = f"{verb[1]} is {_participle(_infinitive(verb[2]))}{words[verb.end() :]}"
+    return words.removeprefix("{0} is ").removesuffix(" {1}")
+
+
+def _related(predicate: str, arity: int, holds: bool, domain: Domain) -> str:
+    """The clause of a fact that is no state, with {0}, {1} for the things."""
+    words = _words(predicate, arity, domain)
+    if holds:
+        return words
+    known = domain.predicates.get(predicate)
+    return (known.opposite if known is not None else "") or denied(words)
+
+
+def _words(predicate: str, arity: int, domain: Domain) -> str:
+    known = domain.predicates.get(predicate)
+    return known.words if known is not None and known.words else by_name(predicate, arity)
+
+
+def by_name(predicate: str, arity: int) -> str:
+    """How a sentence says a fact that has no words: "{0} is inside {1}", "{0} lies in {1}"."""
+    plain = _plain(predicate)
+    if arity == 0:
+        return f"it is so that {plain}"
+    others = " and ".join(f"{{{k}}}" for k in range(1, arity))
+    says = plain if plain.split()[0].endswith("s") and arity > 1 else f"is {plain}"
+    return f"{{0}} {says} {others}".rstrip()
+
+
 def listed(things: Sequence[str], joined: str = "and") -> str:
     """Several things in a row: "a", "a and b", "a, b and c"."""
     if len(things) < 2:
@@ -271,8 +295,8 @@ def _plain(name: str) -> str:
     return " ".join(w.lower() if w[:1].isupper() and w[1:].islower() else w for w in apart.split())
 
 
-def _denied(words: str) -> str:
-    """That something does not hold, from how a sentence says that it does."""
+def denied(words: str) -> str:
+    """That something does not hold, from how a sentence with {0}, {1} says that it does."""
     if words.startswith("nothing "):
         return f"something {words[8:]}"
     if (found := _AUXILIARY.search(words)) is not None:

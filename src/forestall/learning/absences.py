@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from forestall.domain.formula import And, Not, Parameter, Some
 from forestall.domain.schema import Predicate, PredicateKind
+from forestall.domain.spoken import by_name
 from forestall.types.facts import Literal
 from forestall.types.graph import ObjectNode, SceneGraph
 
@@ -72,15 +73,16 @@ def lacking(lack: Lack, vacant: bool) -> Predicate:
     own, other = Parameter("?thing"), Parameter("?other")
     ends = (own.name, other.name) if lack.position == 0 else (other.name, own.name)
     related = tuple(Not(Some((other,), Literal(r, ends))) for r in lack.relations)
-    related_as = spoken(lack.relations[0])
-    thing = (f"{{0}} {related_as} ", "") if lack.position == 0 else ("", f" {related_as} {{0}}")
+    related_as = by_name(lack.relations[0], 2)
+    thing, others = ("{0}", "{}") if lack.position == 0 else ("{}", "{0}")
+    told = related_as.format(thing, others)
     return Predicate(
         lack.name,
         PredicateKind.DERIVED,
         (own,),
         definition=related[0] if len(related) == 1 else And(related),
-        words="{0} is empty" if vacant else f"{thing[0]}nothing{thing[1]}",
-        opposite="{0} is not empty" if vacant else f"{thing[0]}something{thing[1]}",
+        words="{0} is empty" if vacant else told.replace("{}", "nothing"),
+        opposite="{0} is not empty" if vacant else told.replace("{}", "something"),
     )
 
 
@@ -89,17 +91,13 @@ def placed(inside: Inside) -> Predicate:
     own, other = Parameter("?thing"), Parameter("?other")
     there = Literal(inside.relation, (own.name, other.name))
     so = Literal(inside.attribute, (other.name,), inside.value)
-    told = f"{spoken(inside.relation)} {{}} whose {inside.attribute} is {inside.value}"
+    such = f"whose {inside.attribute} is {inside.value}"
+    told = by_name(inside.relation, 2)
     return Predicate(
         inside.name,
         PredicateKind.DERIVED,
         (own,),
         definition=Not(Some((other,), And((there, so)))),
-        words=f"{{0}} {told.format('nothing')}",
-        opposite=f"{{0}} {told.format('something')}",
+        words=told.format("{0}", f"nothing {such}"),
+        opposite=told.format("{0}", f"something {such}"),
     )
-
-
-def spoken(predicate: str) -> str:
-    """A predicate's name as words."""
-    return predicate.replace("_", " ")

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from forestall.domain.formula import Not, Or, Parameter, Some
 from forestall.domain.schema import Category, Predicate, PredicateKind
-from forestall.learning.absences import Inside, Lack, lacking, placed, spoken
+from forestall.domain.spoken import by_name, denied
+from forestall.learning.absences import Inside, Lack, lacking, placed
 from forestall.learning.traces import Trace, graphs_of, hands_of
 from forestall.types.facts import Literal
 from forestall.types.graph import Relation, SceneGraph
@@ -108,8 +109,8 @@ class Vocabulary:
                 contains=contains,
                 group=group if placing else None,
                 offered_by=TAKES + name if contains else "",
-                words=f"{{0}} {spoken(name)} {{1}}",
-                opposite=f"{{0}} not {spoken(name)} {{1}}",
+                words=by_name(name, 2),
+                opposite=denied(by_name(name, 2)),
             )
         for name, values in self.values.items():
             parameters = (Parameter("?thing"),)

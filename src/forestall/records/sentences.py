@@ -24,7 +24,7 @@ _MOST = 2
 """How many facts a sentence tells."""
 
 _UNSEEN = re.compile(r"^not (?:observed|located)(?: here, but in the demonstrations)?: ")
-_HELD_IN = re.compile(r" \(held in \d+ of \d+\)")
+_HELD_IN = re.compile(r" \(held in \d+ of \d+(?: demonstrations?)?\)")
 
 
 def in_sentences(

@@ -138,8 +138,9 @@ class Precondition:
     `literal` uses the skill's variables (and category names for other things). `support` of `total`
     demonstrations had it true; the others had it unobserved or false. `weight` is the probability
     that it is a need and no habit. `kept` is the level that support and weight are of; `levels` has
-    the support at each. `elsewhere` counts the demonstrations in which it held at other times for
-    things of these kinds, and those in which it did not: without the second nothing ever varied.
+    the support at each. A demonstration counts once, however often and on whatever things it used
+    the skill. `elsewhere` counts those in which it held at other times for things of these kinds,
+    and those in which it did not, once for each kind: without the second nothing ever varied.
     `by_hand`: a person says so. `expected_by`: the language model that says so; nobody showed it.
     """
 
