@@ -40,8 +40,8 @@ class Options:
             kind. Honest by default, both for `all`.
         part: of the cases of each set in `all`, from all tasks in turn; 0.05 by default, which is
             an hour on two cores, 1 for every case, which takes many.
-        quick: a tenth of it, with fewer demonstrations and fewer strategies on each case: by
-            its own reckoning eight minutes, timed once 17.
+        quick: a tenth of it, of few tasks in few rooms, with fewer demonstrations and fewer
+            strategies on each case: a first look in minutes.
         demonstrations: of each task in the honest household, each another way to do it (1 to 32);
             8 by default, 1 in a quick experiment.
         out: folder of the results; what is finished in it is not run again.
