@@ -97,7 +97,7 @@ class PerceptionConfig:
         sliver_share: what shows less than this share of the area that it has shown before
             contradicts nothing that is believed of its states, unless it is furniture.
         steady: probability that a state is still what it was surely read to be, or what a skill
-            should have made of it (skills of the honest household fail in 5 to 10 %).
+            should have made of it; the rest is for what changed unseen and for skills that failed.
         outweighs: probability from which a reading is believed against that.
         same_share: share of the smaller of two boxes that both must have for a new thing to be one
             of the same category that was there before and is not seen.
