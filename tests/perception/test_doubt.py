@@ -15,7 +15,7 @@ from forestall.types.facts import Change
 from forestall.types.graph import ObjectNode, SceneGraph
 from forestall.types.plan import Subtask
 
-from .synthetic import Solid, at, looking, observed
+from .synthetic import Solid, at, hollow, looking, observed
 
 NEAR = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
 COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
@@ -89,3 +89,43 @@ def test_what_was_cut_and_is_out_of_sight_is_nowhere_until_it_is_seen() -> None:
         node = eyes.perceive(seen(scene, NEAR, time_s=1.0)).get("Lettuce-1")
         assert node is not None
         assert (node.box_m is None) is (succeeded and not shown)
+
+
+def test_what_shows_of_a_thing_where_it_was_put_is_enough_and_elsewhere_it_is_not() -> None:
+    """A deep sink of which the rim and the far wall show: too few walls around a mug in it."""
+    domain = shipped("household")
+    view = looking((0.22, -0.6, 1.65), (0.22, 0.3, 0.8))
+    kitchen = [
+        Solid("CounterTop-1", (-1.0, -0.4, 0.86), (1.0, 0.1, 0.9)),
+        *hollow("Sink-1", (-0.3, 0.1, 0.7), (0.3, 0.5, 0.9)),
+        Solid("Sink-1", (-0.3, 0.08, 0.89), (0.3, 0.12, 0.9)),
+        Solid("Sink-1", (-0.3, 0.48, 0.89), (0.3, 0.5, 0.9)),
+        Solid("Sink-1", (-0.32, 0.08, 0.89), (-0.28, 0.5, 0.9)),
+        Solid("Sink-1", (0.28, 0.08, 0.89), (0.32, 0.5, 0.9)),
+    ]
+    cup = (0.085, 0.085, 0.1)
+    carried = at("Mug-1", 0.4, -0.3, 1.1, cup, True)
+    inside, beside = at("Mug-1", 0.22, 0.25, 0.71, cup, True), at("Mug-1", 0.0, 0.0, 0.9, cup, True)
+    for mug, done, place in (
+        (inside, True, ("inside", "Sink-1")),
+        (inside, False, None),
+        (beside, True, ("on_top_of", "CounterTop-1")),
+    ):
+        eyes = GraphPerceiver(
+            InstanceSegmenter(),
+            GivenStateEstimator({}),
+            domain,
+            gate=None,
+            alters=lambda graph, subtask: [Change("Mug-1", "inside", "", "Sink-1")],
+        )
+        held = observed([*kitchen, carried], view, holding="Mug-1", hand=(0.4, -0.3, 1.2))
+        eyes.perceive(held)
+        eyes.acted(Subtask.parse("put_in(Mug-1, Sink-1)"), succeeded=done)
+        for time_s in (1.0, 2.0):
+            found = eyes.perceive(observed([*kitchen, mug], view, time_s=time_s))
+            at_rest = [
+                (r.predicate, r.object)
+                for r in found.relations
+                if r.subject == "Mug-1" and r.predicate in domain.containing
+            ]
+            assert at_rest == ([] if place is None else [place])

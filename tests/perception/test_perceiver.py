@@ -191,7 +191,8 @@ def test_nothing_has_two_parents_or_is_its_own(
     data: list[tuple[float, float, float, float]],
 ) -> None:
     stack = things(data, np.zeros(3))
-    found = parents(stack, {t.id for t in stack.things}, shipped("household"), PerceptionConfig())
+    every = {t.id for t in stack.things}
+    found = parents(stack, every, {}, shipped("household"), PerceptionConfig())
     for name in found:
         passed = [name]
         while passed[-1] in found:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from forestall.planning.altered import altered
 from forestall.planning.validate import GraphValidator
-from forestall.types.facts import Literal
+from forestall.types.facts import Change, Literal
 from forestall.types.plan import Plan, Subtask
 from forestall.types.task import Goal
 from planning.corpus import DOMAIN, scene
@@ -25,6 +25,14 @@ def test_a_tap_fills_what_stands_below_it() -> None:
 
 def test_a_drive_changes_no_state() -> None:
     assert after("navigate_to_obj(Fridge-1)") == set()
+
+
+def test_a_thing_that_is_put_down_is_where_it_was_put_and_what_is_picked_up_nowhere() -> None:
+    held = scene("Mug-1 held, Sink-1, Faucet-1, CounterTop-1")
+    put = altered(held, Subtask.parse("put_in(Mug-1, Sink-1)"), DOMAIN)
+    assert Change("Mug-1", "inside", "", "Sink-1") in put
+    taken = altered(scene(SINK), Subtask.parse("pick_up(Cup-1)"), DOMAIN)
+    assert not any(change.attribute in DOMAIN.containing for change in taken)
 
 
 def test_what_could_not_run_or_is_not_known_changes_nothing_that_is_known() -> None:

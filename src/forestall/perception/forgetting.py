@@ -29,12 +29,13 @@ def remove(tracks: Tracks, name: str, heir: str | None = None) -> None:
             child.parent = None if heir is None else (child.parent[0], heir)
 
 
-def doubt(tracks: Tracks, changes: Iterable[Change], succeeded: bool) -> None:
+def doubt(tracks: Tracks, changes: Iterable[Change], succeeded: bool, domain: Domain) -> None:
     """Forget what was read of some states, until they are read again.
 
     Until then they are presumed to be what they were meant to become, or what they were before if
     what should have changed them is said to have failed. A thing that was to turn into others is
-    nowhere until it is seen.
+    nowhere until it is seen. Where one was put is what little of it can be seen there must not
+    contradict.
     """
     for name, attribute, before, after in changes:
         if name not in tracks:
@@ -42,6 +43,8 @@ def doubt(tracks: Tracks, changes: Iterable[Change], succeeded: bool) -> None:
         if attribute == LOCATED:
             if succeeded:
                 tracks[name].lose()
+        elif attribute in domain.containing:
+            tracks[name].meant = (attribute, after) if succeeded else None
         else:
             tracks[name].states.pop(attribute, None)
             tracks[name].sure.pop(attribute, None)

@@ -64,7 +64,7 @@ class SceneMemory:
 
     def doubt(self, changes: Iterable[Change], succeeded: bool) -> None:
         """See `forgetting.doubt`."""
-        doubt(self.tracks, changes, succeeded)
+        doubt(self.tracks, changes, succeeded, self._domain)
 
     # --- integration ----------------------------------------------------------------------------
 
@@ -162,7 +162,7 @@ class SceneMemory:
         if track is None:
             track = Track(held, category_of(self._domain.canonical(held)))
             self.tracks[held] = track
-        track.parent = None
+        track.parent = track.meant = None
         if held not in seen:
             hand = np.asarray(hand_m, dtype=np.float64)
             if track.points_world_m is None:
@@ -264,10 +264,12 @@ class SceneMemory:
         homeless = {n for n, t in self.tracks.items() if t.parent is None and n not in seen}
         held = {h.holding for h in self._hands if h.holding is not None}
         subjects = (seen | homeless) - held
-        found = parents(stack, subjects, self._domain, self._config)
+        meant = {n: place for n in seen if (place := self.tracks[n].meant) is not None}
+        found = parents(stack, subjects, meant, self._domain, self._config)
         for name in sorted(subjects):
             track = self.tracks[name]
             track.parent = found.get(name) or self._former_parent(track)
+            track.meant = None if name in seen else track.meant
         links = {n: t.parent for n, t in self.tracks.items() if t.parent is not None}
         for name in circular(links, found):
             self.tracks[name].parent = None

@@ -27,13 +27,19 @@ Parent = tuple[str, str]
 
 
 def parents(
-    stack: Stack, subjects: Collection[str], domain: Domain, config: PerceptionConfig
+    stack: Stack,
+    subjects: Collection[str],
+    meant: Mapping[str, Parent],
+    domain: Domain,
+    config: PerceptionConfig,
 ) -> dict[str, Parent]:
     """For each subject that rests in or on something: the relation and the receptacle.
 
     Args:
         stack: every located thing.
         subjects: ids whose parent is asked for.
+        meant: where things that are seen were just put, as far as is known. There what is seen of a
+            thing need not have walls found around it, which others may hide.
         domain: which receptacle takes what, and how.
         config: thresholds.
     """
@@ -41,7 +47,7 @@ def parents(
     for a, thing in enumerate(stack.things):
         if thing.id not in subjects or fixed(domain, thing.category):
             continue
-        parent = _parent(stack, a, domain, config)
+        parent = _parent(stack, a, meant.get(thing.id), domain, config)
         if parent is not None:
             found[thing.id] = parent
     return found
@@ -69,7 +75,9 @@ def circular(links: Mapping[str, Parent], seen: Collection[str]) -> list[str]:
     return gone
 
 
-def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> Parent | None:
+def _parent(
+    stack: Stack, a: int, meant: Parent | None, domain: Domain, config: PerceptionConfig
+) -> Parent | None:
     near = _touching(stack, a, config)
     candidates = [
         r for r in near if _takes(domain, stack.things[r].category, stack.things[a].category)
@@ -86,7 +94,9 @@ def _parent(stack: Stack, a: int, domain: Domain, config: PerceptionConfig) -> P
     for r in candidates:
         predicate = offered(domain, stack.things[r].category) or ""
         if domain.predicates[predicate].geometry == CONTAINMENT:
-            if _inside(stack, a, r, share[r], bottom, domain, config):
+            within = _within(stack, a, r, share[r], domain, config)
+            put = meant == (predicate, stack.things[r].id)
+            if within and (put or _walls(stack, a, r, bottom, config) >= config.enclosed_sectors):
                 holding.append((float(area[r]), predicate, r))
             continue
         contacts = _contacts(stack, a, r, bottom, config)
@@ -174,15 +184,10 @@ def _covers(stack: Stack, a: int, r: int, config: PerceptionConfig) -> bool:
     return bool(under.mean() >= config.covered_share)
 
 
-def _inside(
-    stack: Stack,
-    a: int,
-    r: int,
-    share: float,
-    bottom_m: float,
-    domain: Domain,
-    config: PerceptionConfig,
+def _within(
+    stack: Stack, a: int, r: int, share: float, domain: Domain, config: PerceptionConfig
 ) -> bool:
+    """Whether `a` is over the floor of `r` and not over its rim; beside it are perhaps no walls."""
     receptacle = stack.things[r]
     if receptacle.closed or share < config.inside_share:
         return False
@@ -191,11 +196,8 @@ def _inside(
     if float(np.median(z)) < floor - config.rim_slack_m:
         return False
     if domain.encloses(receptacle.category):
-        if float((z <= rim).mean()) < config.inside_share:
-            return False
-    elif float(stack.low_m[a, 2]) > rim + config.rim_slack_m:
-        return False
-    return _walls(stack, a, r, bottom_m, config) >= config.enclosed_sectors
+        return float((z <= rim).mean()) >= config.inside_share
+    return float(stack.low_m[a, 2]) <= rim + config.rim_slack_m
 
 
 def _walls(stack: Stack, a: int, r: int, bottom_m: float, config: PerceptionConfig) -> int:

@@ -26,11 +26,11 @@ class Track:
     `look` is its mean colour, (3,) from 0 to 1, where perception has to tell things apart itself.
     `interior_seen` says that a view reached into it since it was opened, `unmoved` that the newest
     view that showed it showed it where it was before, `vague` that it was seen and never located,
-    `sure` how sure a state was when it was read, 1 where nobody says,
-    `presumed` what skills should have made of states since they were read. `sightings` counts the
-    views that showed it, `shown_m2` is the largest area that one of them showed, `doubted` is
-    another category that a single view of the newest observation called it, `shown` the cells of
-    its surface that views have shown (`unseen.py`).
+    `sure` how sure a state was when it was read, 1 where nobody says, `presumed` what skills should
+    have made of states since they were read, `meant` in or on what one should have put it since it
+    was seen. `sightings` counts the views that showed it, `shown_m2` is the largest area that one
+    of them showed, `doubted` is another category that a single view of the newest observation
+    called it, `shown` the cells of its surface that views have shown (`unseen.py`).
     """
 
     id: str
@@ -47,6 +47,7 @@ class Track:
     states: dict[str, str | None] = field(default_factory=dict)
     sure: dict[str, float] = field(default_factory=dict)
     presumed: dict[str, str] = field(default_factory=dict)
+    meant: Parent | None = None
     feature: bytes | None = None
     look: Points | None = None
     parent: Parent | None = None
@@ -66,10 +67,11 @@ class Track:
             self.centroid_m = self.centroid_m + offset_m
 
     def remember(self, other: Track) -> None:
-        """Take over what was read of the states under another name and is not read anew."""
+        """Take over what is known under another name: states not read anew, where it was put."""
         known = {a: v for a, v in other.states.items() if v is not None}
         self.sure = {**{a: other.sure.get(a, 1.0) for a in known}, **self.sure}
         self.states = {**known, **self.states}
+        self.meant = self.meant or other.meant
 
     def lose(self) -> None:
         """Forget where it is."""

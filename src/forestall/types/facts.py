@@ -25,7 +25,8 @@ GRIPPER = "gripper"
 class Change(NamedTuple):
     """A state of a thing that something may have changed: from a value to another.
 
-    Of what may be no more the attribute is "located".
+    Of what may be no more the attribute is "located"; of what was put in or on another thing, it is
+    the relation, and the value after is that thing.
     """
 
     thing: str
