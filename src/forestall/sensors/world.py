@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 from forestall.domain.model import Domain
 from forestall.seams.acting import Environment
+from forestall.seams.around import Around
 from forestall.sensors.sensor import Errors, Sensor
-from forestall.types.episode import SkillOutcome
 from forestall.types.observation import Observation, Vec3
-from forestall.types.plan import Subtask
 
 
-class SensedWorld:
+class SensedWorld(Around):
     """Implements `Environment`: what is done is done in the world, what is seen is the sensor's.
 
     Args:
@@ -22,7 +21,8 @@ class SensedWorld:
     """
 
     def __init__(self, environment: Environment, sensor: Sensor) -> None:
-        self._inner, self._sensor = environment, sensor
+        super().__init__(environment)
+        self._sensor = sensor
 
     def reset(self, seed: int) -> None:
         """Reset world and sensor."""
@@ -36,27 +36,6 @@ class SensedWorld:
     def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
         """Look towards points, through the sensor."""
         return self._sensor.sense(self._inner.observe(focus))
-
-    def approach(self, name: str) -> float:
-        """As the world."""
-        return self._inner.approach(name)
-
-    def execute(self, subtask: Subtask) -> SkillOutcome:
-        """As the world."""
-        return self._inner.execute(subtask)
-
-    def hold(self) -> None:
-        """As the world."""
-        self._inner.hold()
-
-    @property
-    def time_s(self) -> float:
-        """As the world."""
-        return self._inner.time_s
-
-    def close(self) -> None:
-        """As the world."""
-        self._inner.close()
 
 
 @dataclass(frozen=True, slots=True)

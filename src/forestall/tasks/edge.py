@@ -17,6 +17,7 @@ import numpy as np
 
 from forestall.domain.model import Domain
 from forestall.seams.acting import Environment
+from forestall.seams.around import Around
 from forestall.tasks.eyes import SharedEyes
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import category_of, is_instance
@@ -60,7 +61,7 @@ def bare(frame: Frame) -> Frame:
     return replace(frame, instance_ids=numbers[ids], instance_names=names)
 
 
-class WorldsEdge:
+class WorldsEdge(Around):
     """Implements `Environment` and `Unnamed`.
 
     Args:
@@ -77,7 +78,7 @@ class WorldsEdge:
         domain: Domain,
         told: Sequence[str] = (),
     ) -> None:
-        self._inner = environment
+        super().__init__(environment)
         self._look = truth
         self._domain = domain
         self._names = tuple(dict.fromkeys(domain.canonical(n) for n in told))
@@ -135,19 +136,6 @@ class WorldsEdge:
         self.newest = Subtask(subtask.skill, args)
         outcome = self._inner.execute(self.newest)
         return replace(outcome, reason=_NAME.sub(self._spoken, outcome.reason))
-
-    def hold(self) -> None:
-        """As the wrapped environment."""
-        self._inner.hold()
-
-    @property
-    def time_s(self) -> float:
-        """As the wrapped environment."""
-        return self._inner.time_s
-
-    def close(self) -> None:
-        """As the wrapped environment."""
-        self._inner.close()
 
     def truly(self, subtask: Subtask, graph: SceneGraph) -> Subtask:
         """What a subtask in perception's names would be done with now, for scoring alone.

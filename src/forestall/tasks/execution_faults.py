@@ -14,9 +14,9 @@ from typing import Protocol
 
 from forestall.domain.model import Domain
 from forestall.seams.acting import Disturbance, Environment
+from forestall.seams.around import Around
 from forestall.types.episode import SkillOutcome, SkillStatus
 from forestall.types.facts import is_instance
-from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Subtask
 
 
@@ -40,7 +40,7 @@ class Activation(Protocol):
         """How many times it happens at most."""
 
 
-class FaultyEnvironment:
+class FaultyEnvironment(Around):
     """Hands every call on, and lets faults happen in `execute`."""
 
     def __init__(
@@ -50,7 +50,7 @@ class FaultyEnvironment:
         disturbance: Disturbance,
         domain: Domain,
     ) -> None:
-        self._inner = environment
+        super().__init__(environment)
         self._faults = tuple(faults)
         self._disturbance = disturbance
         self._domain = domain
@@ -75,18 +75,6 @@ class FaultyEnvironment:
     def idle(self) -> int:
         """How many faults have not happened so far, or could not."""
         return self._done.count(0) + self._undone
-
-    def scan(self, thorough: bool = False) -> Observation:
-        """As the wrapped environment."""
-        return self._inner.scan(thorough)
-
-    def observe(self, focus: Sequence[Vec3] = ()) -> Observation:
-        """As the wrapped environment."""
-        return self._inner.observe(focus)
-
-    def approach(self, name: str) -> float:
-        """Drive near, undisturbed."""
-        return self._inner.approach(name)
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run a skill, with every fault that is due."""
@@ -115,10 +103,6 @@ class FaultyEnvironment:
             self._mistaken -= {i for i in self._mistaken if self._is_right(i, subtask.args[0])}
             self._mistaken |= {i for i in due if self._faults[i].kind == "wrong_object"}
         return outcome
-
-    def hold(self) -> None:
-        """As the wrapped environment."""
-        self._inner.hold()
 
     def _meddle(self, fault: Activation) -> None:
         """Somebody else changes the world, as far as it can be done."""
@@ -160,15 +144,6 @@ class FaultyEnvironment:
             hard = bool(getattr(fault, "hard", False))
             if self._disturbance.drop_held(hard) is not None:
                 self._done[index] += 1
-
-    @property
-    def time_s(self) -> float:
-        """As the wrapped environment."""
-        return self._inner.time_s
-
-    def close(self) -> None:
-        """As the wrapped environment."""
-        self._inner.close()
 
     def _due(self, subtask: Subtask) -> list[int]:
         due = []

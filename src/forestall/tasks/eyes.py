@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from forestall.domain.model import Domain
-from forestall.seams.acting import Environment
+from forestall.seams.around import Around
 from forestall.tasks.execution_faults import FaultyEnvironment
 from forestall.types.episode import SkillOutcome
 from forestall.types.facts import category_of
@@ -20,7 +20,7 @@ from forestall.types.observation import Frame, Observation, Vec3
 from forestall.types.plan import Subtask
 
 
-class SharedEyes:
+class SharedEyes(Around):
     """Implements `Environment`.
 
     Args:
@@ -32,7 +32,7 @@ class SharedEyes:
     def __init__(
         self, environment: FaultyEnvironment, mistaken: Mapping[str, str], domain: Domain
     ) -> None:
-        self._inner: Environment = environment
+        super().__init__(environment)
         self._faults = environment
         self._mistaken = dict(mistaken)
         self._domain = domain
@@ -64,19 +64,6 @@ class SharedEyes:
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Do it with what is meant."""
         return self._inner.execute(Subtask(subtask.skill, tuple(map(self._meant, subtask.args))))
-
-    def hold(self) -> None:
-        """As the wrapped environment."""
-        self._inner.hold()
-
-    @property
-    def time_s(self) -> float:
-        """As the wrapped environment."""
-        return self._inner.time_s
-
-    def close(self) -> None:
-        """As the wrapped environment."""
-        self._inner.close()
 
     def _meant(self, name: str) -> str:
         """The true instance behind a name; the held one where its category is named."""
