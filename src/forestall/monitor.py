@@ -329,6 +329,21 @@ class Monitor:
             return run.views(run.ground())
         return () if run.last is None else run.views(run.last.subtask)
 
+    def best_vantage(self, eyes: Sequence[Vec3], points: Sequence[Vec3]) -> int | None:
+        """For another look: from which place of the camera more would be seen around points.
+
+        Args:
+            eyes: places where it could be, metres in the world.
+            points: what should be looked at, as a decision's `look_at`.
+
+        Returns:
+            A position in `eyes`; None where none is worth the way, or the perceiver cannot tell.
+
+        Raises:
+            PartError: the perceiver failed or was late.
+        """
+        return self._parts.best_vantage(eyes, points)
+
     def approach(self) -> str | None:
         """What to drive to before looking: where the next subtask will be done, None for nothing.
 

@@ -29,7 +29,7 @@ from forestall.types.episode import (
     Trouble,
     TroubleKind,
 )
-from forestall.types.observation import Observation
+from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Plan
 from forestall.types.runtime import LooksAfter
 from forestall.types.task import Task
@@ -285,11 +285,14 @@ class Runtime:
 
     def _before(self, episode: _Episode) -> MonitorDecision:
         """Go to where the next subtask will be done, and judge what is seen there."""
+        self._approach()
+        return self._judged(episode, self._monitor.before)
+
+    def _approach(self) -> None:
         with self._monitor.phase("act"):
             place = self._monitor.approach()
             if place is not None:
                 self._world.approach(place, self._monitor.graph.places())
-        return self._judged(episode, self._monitor.before)
 
     def _execute(self, episode: _Episode, decision: MonitorDecision) -> MonitorDecision | None:
         monitor, command = self._monitor, decision.command
@@ -318,9 +321,10 @@ class Runtime:
     ) -> MonitorDecision:
         """Look, ask, and look all around where the monitor wants another look.
 
-        Every look is judged and recorded.
+        Every look is judged and recorded. Where more would be seen from elsewhere, the robot goes
+        there, and back before it acts.
         """
-        world = self._world
+        world, moved = self._world, False
         with self._monitor.phase("observe"):
             observation = world.observe(self._monitor.wanted_views())
         while True:
@@ -328,11 +332,25 @@ class Runtime:
             decision = ask(observation)
             self._note(episode, decision)
             if decision.outcome is not Outcome.LOOK:
+                if moved:
+                    self._approach()
                 return decision
             with self._monitor.phase("observe"):
+                moved |= self._go_to_look(decision.look_at)
                 around = world.scan(thorough=True)
                 ahead = world.observe(decision.look_at)
                 observation = replace(ahead, frames=(*around.frames, *ahead.frames))
+
+    def _go_to_look(self, points: Sequence[Vec3]) -> bool:
+        """Go to where more would be seen around the points, if the robot can; whether it went."""
+        if not points:
+            return False
+        eyes = self._world.vantages(points[-1])
+        best = self._monitor.best_vantage(eyes, points)
+        if best is None:
+            return False
+        self._world.look_from(eyes[best], points[-1])
+        return True
 
     def _note(self, episode: _Episode, decision: MonitorDecision) -> None:
         record, context = decision.record, decision.context

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from forestall.errors import ForestallError, ObservationError, PartError
-from forestall.seams.acting import Unnamed
+from forestall.seams.acting import Unnamed, Vantages
 from forestall.supervision import Supervisor, checked_answer
 from forestall.types.episode import SkillOutcome
 from forestall.types.graph import SceneGraph
@@ -65,6 +65,20 @@ class SupervisedWorld:
             return world.approach(name)
 
         self._calls.call("approach", drive, "approach")
+
+    def vantages(self, point: Vec3) -> tuple[Vec3, ...]:
+        """Where the camera could be to look at a point, besides where it is."""
+        world = self._environment
+        if not isinstance(world, Vantages):
+            return ()
+        offered = self._calls.call("vantages", lambda: world.vantages(point), "observe")
+        return tuple(offered)
+
+    def look_from(self, place: Vec3, point: Vec3) -> None:
+        """Bring the camera to one of them."""
+        world = self._environment
+        assert isinstance(world, Vantages), "it has offered the place"
+        self._calls.call("look_from", lambda: world.look_from(place, point), "approach")
 
     def execute(self, subtask: Subtask, where: Where) -> SkillOutcome:
         """Run one skill."""
@@ -166,6 +180,20 @@ class SupervisedParts:
         told = getattr(self._perceiver, "acted", None)
         if told is not None:
             self._calls.call("perceiver", lambda: told(subtask, succeeded), "perceive")
+
+    def best_vantage(self, eyes: Sequence[Vec3], points: Sequence[Vec3]) -> int | None:
+        """Which of some places of the camera is worth going to; None for none.
+
+        Raises:
+            PartError: the perceiver failed or was late, or named a place that is not there.
+        """
+        asked = getattr(self._perceiver, "best_vantage", None)
+        if asked is None or not eyes:
+            return None
+        best = self._calls.call("perceiver", lambda: asked(eyes, points), "perceive")
+        if best is not None and best not in range(len(eyes)):
+            raise PartError("perceiver", f"named place {best!r} of {len(eyes)}")
+        return None if best is None else int(best)
 
     @property
     def domain(self) -> Domain:

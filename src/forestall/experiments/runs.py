@@ -75,14 +75,14 @@ ABLATED = 0.5
 QUICK = 0.1
 """Of the cases that are run otherwise, in a quick experiment."""
 
-QUICK_TASKS = 4
+QUICK_TASKS = 3
 """Of a quick experiment in the honest household; the longer ones beside. In the kind one 1."""
 
 QUICK_DEMONSTRATIONS = 1
 """Of each task in the honest household, in a quick experiment."""
 
-QUICK_TURN = 6
-"""Of strategies that step in, and trying again, each sixth acts on a case, others on the next."""
+QUICK_TURN = 12
+"""Of strategies that step in, and trying again, each twelfth acts on a case, others on the next."""
 
 PAPER_DETECTOR = "scene-graph"
 
@@ -202,7 +202,7 @@ class Choice:
         profiles: of the household; by default the honest one, and for "all" both.
         part: of the cases of each set in "all" and "transfer", from all tasks in turn.
         quick: a tenth of that, of few tasks; of the strategies that step in one case of each set
-            has a sixth, and of the undisturbed runs there are no twins.
+            has a twelfth, and of the undisturbed runs there are no twins.
         demonstrations: of each task in the honest household, each another way to do it; by default
             `DEMONSTRATIONS`, `QUICK_DEMONSTRATIONS` in a quick experiment.
         models: whether a language model reasons in an ablation, too.

@@ -26,13 +26,14 @@ from forestall.perception.naming import Known, mean_looks, name_detections
 from forestall.perception.own_names import expected, join_parts, known, named_hands
 from forestall.perception.scope import scope
 from forestall.perception.surfaces import fixed, with_surfaces
-from forestall.perception.tracks import View
+from forestall.perception.tracks import View, vec
 from forestall.perception.unproject import (
     Cloud,
     Labels,
     clouds,
     label_image,
 )
+from forestall.perception.vantage import best_vantage
 from forestall.seams.perceiving import (
     ConfidentStateEstimator,
     ImageEncoder,
@@ -93,10 +94,12 @@ class GraphPerceiver:
         self.findings: tuple[Finding, ...] = ()
         self.named: tuple[tuple[Detection, ...], ...] = ()
         self._memory = SceneMemory(domain, self._config)
+        self._eye: Vec3 | None = None
 
     def reset(self) -> None:
         """Forget everything."""
         self._memory.reset()
+        self._eye = None
         self.findings, self.named = (), ()
         if self._watch is not None:
             self._watch.reset()
@@ -127,6 +130,7 @@ class GraphPerceiver:
         ]
         views = self._views(observation, masked)
         self._memory.integrate(observation, views)
+        self._eye = vec(observation.frames[-1].camera_to_world[:3, 3])
         self.named = tuple(map(with_names, given, views))
         if self._memory.forgotten:
             names = ", ".join(self._memory.forgotten)
@@ -142,6 +146,13 @@ class GraphPerceiver:
         """
         if self._alters is not None:
             self._memory.doubt(self._alters(self._memory.graph(), subtask), succeeded)
+
+    def best_vantage(self, eyes: Sequence[Vec3], points: Sequence[Vec3]) -> int | None:
+        """See `Perceiver`."""
+        if self._eye is None:
+            return None
+        tracks = self._memory.tracks
+        return best_vantage(tracks, points, eyes, self._eye, self._domain, self._config)
 
     def scope(self, graph: SceneGraph, subtask: Subtask) -> SceneGraph:
         """The part of a graph that concerns a (grounded) subtask, with its subtask node."""

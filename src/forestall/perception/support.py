@@ -129,6 +129,12 @@ def offered(domain: Domain, receptacle: str) -> str | None:
     return next(tops, None)
 
 
+def contains(category: str, domain: Domain) -> bool:
+    """Whether things are within its walls and not on its top."""
+    relation = domain.offers(category)
+    return relation is not None and domain.predicates[relation].geometry == CONTAINMENT
+
+
 def _takes(domain: Domain, receptacle: str, thing: str) -> bool:
     """Whether a thing can be in or on another, by rule; within walls only points count.
 

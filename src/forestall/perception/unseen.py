@@ -15,7 +15,7 @@ import numpy.typing as npt
 from forestall.domain.looked import in_sight
 from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
-from forestall.perception.support import CONTAINMENT
+from forestall.perception.support import contains
 from forestall.perception.tracks import Track, View
 from forestall.perception.unproject import Points, project
 
@@ -37,13 +37,27 @@ def look_over(
     for place in tracks:
         if place.points_world_m is None or not in_sight(place.category, domain):
             continue
-        cells = _cells(place, config).reshape(-1, 2)
-        cells = cells[~np.isin(_keys(cells), place.shown)]
-        if not len(cells):
-            continue
-        level_m = np.full(len(cells), _level_m(place, domain) + config.over_m)
-        seen = _seen(np.column_stack([(cells + 0.5) * config.cell_m, level_m]), views, config)
-        place.shown = np.union1d(place.shown, _keys(cells[seen]))
+        cells = _unshown(place, config)
+        if len(cells):
+            seen = _seen(_over(cells, place, domain, config), views, config)
+            place.shown = np.union1d(place.shown, _keys(cells[seen]))
+
+
+def unshown(place: Track, domain: Domain, config: PerceptionConfig) -> Points:
+    """(n, 3) points close over the surface of a located place where no view has shown it."""
+    return _over(_unshown(place, config), place, domain, config)
+
+
+def _unshown(place: Track, config: PerceptionConfig) -> Cells:
+    """(n, 2) cells of a place that no view has shown."""
+    cells = _cells(place, config).reshape(-1, 2)
+    return cells[~np.isin(_keys(cells), place.shown)]
+
+
+def _over(cells: Cells, place: Track, domain: Domain, config: PerceptionConfig) -> Points:
+    """(n, 3) the middles of cells, close over the surface."""
+    level_m = np.full(len(cells), _level_m(place, domain) + config.over_m)
+    return np.column_stack([(cells + 0.5) * config.cell_m, level_m])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,9 +130,7 @@ def _seen(points: Points, views: Sequence[View], config: PerceptionConfig) -> np
 
 def _level_m(place: Track, domain: Domain) -> float:
     """How high the surface is on which things stand: the top, or the bottom that is seen."""
-    relation = domain.offers(place.category)
-    inside = relation is not None and domain.predicates[relation].geometry == CONTAINMENT
-    return float((place.low_m if inside else place.high_m)[2])
+    return float((place.low_m if contains(place.category, domain) else place.high_m)[2])
 
 
 def _cells(place: Track, config: PerceptionConfig) -> Cells:

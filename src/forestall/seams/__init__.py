@@ -15,6 +15,7 @@ from forestall.seams.acting import (
     OracleView,
     Renderer,
     Unnamed,
+    Vantages,
     World,
     WorldPart,
 )
@@ -82,6 +83,7 @@ __all__ = [
     "Strategy",
     "TextEncoder",
     "Unnamed",
+    "Vantages",
     "World",
     "WorldPart",
 ]

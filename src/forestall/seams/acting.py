@@ -72,6 +72,24 @@ class Unnamed(Protocol):
         """As `execute`."""
 
 
+@runtime_checkable
+class Vantages(Protocol):
+    """A robot that can look at something from elsewhere, beside `Environment`."""
+
+    def vantages(self, point: Vec3) -> Sequence[Vec3]:
+        """Places of the camera, metres in the world, to which it could go to look at a point.
+
+        As far as the robot knows the room; the one where it is need not be among them. Empty where
+        there is none.
+        """
+
+    def look_from(self, place: Vec3, point: Vec3) -> float:
+        """Bring the camera to one of them and face the point; simulated seconds.
+
+        It may end somewhere near, and says by its pictures where it is.
+        """
+
+
 class OracleView(Protocol):
     """Ground truth. Only worlds, perception/oracle and tasks/ may touch it."""
 

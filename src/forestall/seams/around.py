@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from forestall.seams.acting import Environment
+from forestall.seams.acting import Environment, Vantages
 from forestall.types.episode import SkillOutcome
 from forestall.types.observation import Observation, Vec3
 from forestall.types.plan import Subtask
 
 
 class Around:
-    """Implements `Environment` by another one.
+    """Implements `Environment` and `Vantages` by another one.
 
     Args:
         environment: to which every call is passed on.
@@ -38,6 +38,14 @@ class Around:
     def approach(self, name: str) -> float:
         """See `Environment`."""
         return self._inner.approach(name)
+
+    def vantages(self, point: Vec3) -> Sequence[Vec3]:
+        """See `Vantages`; nowhere where the other one has none."""
+        return self._inner.vantages(point) if isinstance(self._inner, Vantages) else ()
+
+    def look_from(self, place: Vec3, point: Vec3) -> float:
+        """See `Vantages`."""
+        return self._inner.look_from(place, point) if isinstance(self._inner, Vantages) else 0.0
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """See `Environment`."""

@@ -82,7 +82,10 @@ class Perceiver(Protocol):
     """Turns observations into one scene graph that lives over the episode.
 
     One with a method `acted(subtask, succeeded)` is told each skill that was carried out and
-    whether it is said to have succeeded, so that it can doubt what that may have changed.
+    whether it is said to have succeeded, so that it can doubt what that may have changed. One with
+    a method `best_vantage(eyes, points)` is asked before a second look from which of some places of
+    the camera it would see more of what it has not seen around some points (both metres in the
+    world): a position in `eyes`, None where none is worth the way.
     """
 
     def reset(self) -> None:

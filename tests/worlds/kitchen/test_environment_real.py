@@ -99,3 +99,29 @@ def test_what_is_named_wrongly_at_building_is_a_clear_error() -> None:
     needs = SceneNeeds(objects=(ObjectNeed("Mug-1", "Mug", ("Toaster",)),))
     with pytest.raises(SceneError, match="Toaster does not take a Mug"):
         KitchenEnvironment(needs, shipped("household")).reset(0)
+
+
+def test_a_robot_that_roves_looks_from_elsewhere_and_says_where_it_is() -> None:
+    env = KitchenEnvironment(NEEDS, shipped("household"), intrinsics=SMALL, roves=True)
+    env.reset(5)
+    where = env.oracle.truth().get("Mug-1").centroid_m
+    offered = env.vantages(where)
+    assert offered and len(set(offered)) == len(offered)
+    before_s = env.time_s
+    for place in (offered[0], offered[-1]):
+        assert 0.5 < np.hypot(place[0] - where[0], place[1] - where[1]) < 1.5
+        seconds = env.look_from(place, where)
+        frame = env.observe([where]).frames[-1]
+        assert np.allclose(frame.camera_to_world[:3, 3], place)
+        ahead = frame.camera_to_world[:3, 2]
+        way = np.subtract(where, place)
+        assert float(ahead @ way) / np.linalg.norm(way) > 0.99
+        assert env.time_s >= before_s + seconds
+        before_s = env.time_s
+    env.hold()
+    assert env.vantages(where) == () and env.look_from(offered[0], where) == 0.0
+
+
+def test_a_robot_that_does_not_rove_offers_nothing(env: KitchenEnvironment) -> None:
+    env.reset(5)
+    assert env.vantages((0.0, 0.0, 1.0)) == ()

@@ -25,7 +25,7 @@ from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, GripperState, Intrinsics, Observation, Vec3
 from forestall.types.plan import Subtask
 from forestall.types.scene import SceneNeeds
-from forestall.worlds.kitchen import effects
+from forestall.worlds.kitchen import effects, navigation
 from forestall.worlds.kitchen.actor import Robot, SkillTimes
 from forestall.worlds.kitchen.catalogue import Catalogue, catalogue
 from forestall.worlds.kitchen.household import FLOOR, Household
@@ -42,7 +42,7 @@ from forestall.worlds.kitchen.naming import (
 from forestall.worlds.kitchen.needs import roomed
 from forestall.worlds.kitchen.rendering.memory import FrameMemory
 from forestall.worlds.kitchen.skills import perform
-from forestall.worlds.kitchen.stage import Lifelike, Stage
+from forestall.worlds.kitchen.stage import Lifelike, Roving, Stage
 from forestall.worlds.kitchen.streams import Streams, chance
 
 SCAN_FRAMES = 7
@@ -54,9 +54,6 @@ FLOOR_TILT_RAD = math.radians(62.0)
 
 NECK_RAD = math.radians(80.0)
 """What is further to the side than this is looked at by turning the base."""
-
-ONE_VIEW_RAD = math.radians(17.0)
-"""Directions this near to a group's middle are looked at in one frame."""
 
 AHEAD_TILT_RAD = math.radians(15.0)
 
@@ -106,6 +103,7 @@ class KitchenEnvironment:
         rates: how often motions go wrong; never where it is None.
         ways: in which the household may differ from its catalogue; none by default.
         draws: what draws a floor plan, by kind of room; the kitchen's own rooms by default.
+        roves: whether the robot offers to look at things from elsewhere.
     """
 
     def __init__(
@@ -123,7 +121,9 @@ class KitchenEnvironment:
         rates: Rates | None = None,
         ways: Sequence[Way] = (),
         draws: Mapping[str, Draw] | None = None,
+        roves: bool = False,
     ) -> None:
+        self._roves = roves
         self._needs = roomed(needs)
         self._catalogue = catalogue(domain)
         self._intrinsics = intrinsics or Intrinsics.from_vertical_fov(
@@ -200,9 +200,9 @@ class KitchenEnvironment:
             return self._observation([self._frame(world.camera_to_world(0.0, AHEAD_TILT_RAD))])
         eye = world.look_at(focus[0])[:3, 3]
         frames = []
-        for aim in _aims(np.asarray(focus, dtype=float) - eye):
+        for aim in navigation.aims(np.asarray(focus, dtype=float) - eye):
             heading = math.atan2(aim[1], aim[0])
-            far = abs(_wrapped(heading - world.robot_yaw_rad)) > NECK_RAD
+            far = abs(navigation.wrapped(heading - world.robot_yaw_rad)) > NECK_RAD
             if far and not self._holding:
                 self._acting.household.time_s += world.turn_to(heading)
             frames.append(self._frame(world.look_at((eye + aim).tolist())))
@@ -216,6 +216,22 @@ class KitchenEnvironment:
             with suppress(RefusalError):
                 self._acting.approach(name)
         return household.time_s - start_s
+
+    def vantages(self, point: Vec3) -> Sequence[Vec3]:
+        """See `Vantages`."""
+        world = self._stage
+        if not self._roves or self._holding or not isinstance(world, Roving):
+            return ()
+        return world.lookouts(point)
+
+    def look_from(self, place: Vec3, point: Vec3) -> float:
+        """See `Vantages`."""
+        world = self._stage
+        if self._holding or not isinstance(world, Roving):
+            return 0.0
+        seconds = world.look_from(place, point)
+        self._acting.household.time_s += seconds
+        return seconds
 
     def execute(self, subtask: Subtask) -> SkillOutcome:
         """Run one skill; the automatic effects settle before it (time has passed) and after."""
@@ -345,31 +361,6 @@ class KitchenEnvironment:
             time_s=household.time_s,
             robot_position_world_m=world.robot_position_world_m,
         )
-
-
-def _aims(ways: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
-    """Directions to look in, one for each group of (n, 3) directions that fit into one view.
-
-    The group of the last direction comes last.
-    """
-    units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    groups: list[list[npt.NDArray[np.float64]]] = []
-    for unit in units:
-        for group in groups:
-            middle = np.mean([*group, unit], axis=0)
-            middle /= np.linalg.norm(middle)
-            if all(float(middle @ u) >= math.cos(ONE_VIEW_RAD) for u in (*group, unit)):
-                group.append(unit)
-                break
-        else:
-            groups.append([unit])
-    last = next(g for g in groups if any((u == units[-1]).all() for u in g))
-    groups = [*(g for g in groups if g is not last), last]
-    return [np.mean(group, axis=0) for group in groups]
-
-
-def _wrapped(angle_rad: float) -> float:
-    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
 def _builder(honest: bool, draws: Mapping[str, Draw] | None) -> Build:

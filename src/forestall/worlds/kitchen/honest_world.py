@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from forestall.errors import SceneError
+from forestall.types.observation import Vec3
 from forestall.worlds.kitchen.bodies import Bodies
 from forestall.worlds.kitchen.forms import FLOOR
 from forestall.worlds.kitchen.navigation import ROBOT_RADIUS_M, Floor, Standing
@@ -54,10 +55,14 @@ class HonestWorld(KitchenWorld):
         goal = self._on_the_map(name, share) or self.standing_for(name)
         if goal is None:
             return 0.0
-        goal = self._missed(goal, *off)
-        seconds = self.standing.seconds_to(goal)
-        self._stand(goal)
-        return seconds
+        return self.go_to(self._missed(goal, *off))
+
+    def look_from(self, place: Vec3, point: Vec3) -> float:
+        """Drive to where the point can be looked at, or somewhere near."""
+        _, *off = self._chance("lookout")
+        x, y, _ = place
+        goal = Standing(x, y, float(np.arctan2(point[1] - y, point[0] - x)))
+        return self.go_to(self._missed(goal, *off))
 
     def _on_the_map(self, name: str, share: float) -> Standing | None:
         """A free place before the furniture from which the arm reaches, the best for a share 0."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
+from forestall.types.observation import Vec3
 from forestall.worlds.kitchen.forms import Float, Pose, Rect, Stance
 
 EYE_HEIGHT_M = 1.575
@@ -18,7 +19,13 @@ DRIVE_M_PER_S = 0.25
 TURN_RAD_PER_S = np.pi / 2
 PAN_LIMIT_RAD = float(np.deg2rad(100))
 TILT_LIMITS_RAD = (float(np.deg2rad(-45)), float(np.deg2rad(75)))
+REACH_M = 1.45
+REACH_ANGLE_RAD = float(np.deg2rad(75))
 _CELL_M = 0.06
+_RINGS_M = (0.7, 1.0, 1.4)
+_TURNS = 16
+ONE_VIEW_RAD = float(np.deg2rad(17.0))
+"""Directions this near to a group's middle are looked at in one frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +146,38 @@ def camera(eye: Float, yaw_rad: float, tilt_rad: float) -> Pose:
     return out
 
 
+def in_reach(here: Standing, low: Float, high: Float) -> bool:
+    """Whether the arm reaches a box from where the robot stands."""
+    base = np.array([here.x, here.y])
+    way = np.clip(base, low[:2], high[:2]) - base
+    distance = float(np.hypot(*way))
+    if distance > REACH_M or low[2] > 2.0:
+        return False
+    if distance < 0.3:
+        return True
+    off = wrapped(float(np.arctan2(way[1], way[0])) - here.yaw_rad)
+    return abs(off) <= REACH_ANGLE_RAD
+
+
+def lookouts(floor: Floor, here: Standing, point: Sequence[float]) -> list[Vec3]:
+    """Where the eyes could be to look at a point: places on rings around it, the nearest first.
+
+    Args:
+        floor: the free floor; what is not free, or cannot be reached on it, is left out.
+        here: where the robot stands.
+        point: in the world.
+    """
+    angles = 2 * np.pi * np.arange(_TURNS) / _TURNS
+    around = [
+        (float(point[0] + r * np.cos(a)), float(point[1] + r * np.sin(a)))
+        for r in _RINGS_M
+        for a in angles
+    ]
+    free = [p for p in around if floor.free(*p) and floor.connected((here.x, here.y), p)]
+    free.sort(key=lambda p: (round(float(np.hypot(p[0] - here.x, p[1] - here.y)), 9), p))
+    return [(x, y, EYE_HEIGHT_M) for x, y in free]
+
+
 def sight_points(low: Float, high: Float) -> Float:
     """Points of a box that stand for it when one asks whether it can be seen, (n, 3)."""
     c, h = (low + high) / 2, (high - low) / 2
@@ -151,3 +190,24 @@ def sight_points(low: Float, high: Float) -> Float:
 def share(hits: Sequence[str | None], wanted: frozenset[str]) -> float:
     """Which part of the glances met what was wanted."""
     return sum(hit in wanted for hit in hits) / max(len(hits), 1)
+
+
+def aims(ways: Float) -> list[Float]:
+    """Directions to look in, one for each group of (n, 3) directions that fit into one view.
+
+    The group of the last direction comes last.
+    """
+    units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    groups: list[list[Float]] = []
+    for unit in units:
+        for group in groups:
+            middle = np.mean([*group, unit], axis=0)
+            middle /= np.linalg.norm(middle)
+            if all(float(middle @ u) >= np.cos(ONE_VIEW_RAD) for u in (*group, unit)):
+                group.append(unit)
+                break
+        else:
+            groups.append([unit])
+    last = next(g for g in groups if any((u == units[-1]).all() for u in g))
+    groups = [*(g for g in groups if g is not last), last]
+    return [np.mean(group, axis=0) for group in groups]

@@ -87,6 +87,7 @@ class Kitchens:
         rooms: "own" (drawn from the seed), or "ithor" (after seven rooms of AI2-THOR).
         names: whose names the robot has of things: "shared" with the simulator, its "own", or as
             the profile has it: shared in the kind one, its own in the honest one.
+        roves: whether the robot goes where it sees more, where something has to be looked at again.
 
     Raises:
         UnknownNameError: no such renderer.
@@ -103,6 +104,7 @@ class Kitchens:
         rates: Rates | None = None,
         rooms: Rooms = Rooms.OWN,
         names: NamesOption = NamesOption.PROFILE,
+        roves: bool = False,
     ) -> None:
         need(f"the world {self.name}", "kitchen", "mujoco")
         if renderer not in RENDERERS:
@@ -117,6 +119,7 @@ class Kitchens:
         self._draws = draws() if rooms is Rooms.ITHOR else None
         own = honest if names is NamesOption.PROFILE else names is NamesOption.OWN
         self._shares_names = not own
+        self._roves = roves
         self._frames = FrameMemory()
 
     @staticmethod
@@ -144,6 +147,7 @@ class Kitchens:
             rates=self._rates,
             ways=self._ways,
             draws=self._draws,
+            roves=self._roves,
         )
         try:
             yield OpenKitchen(kitchen, self._shares_names)

@@ -53,6 +53,17 @@ class Stage(World, Protocol):
 
 
 @runtime_checkable
+class Roving(Protocol):
+    """A world whose robot can go where it sees something else of a point."""
+
+    def lookouts(self, point: Vec3) -> Sequence[Vec3]:
+        """Where its eyes could be to look at a point, the nearest first."""
+
+    def look_from(self, place: Vec3, point: Vec3) -> float:
+        """Drive to one of them and face the point; returns the simulated seconds."""
+
+
+@runtime_checkable
 class Lifelike(Protocol):
     """A world whose robot does not stand where it meant to, and feels how wide its hand is open."""
 

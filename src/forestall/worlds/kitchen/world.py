@@ -39,8 +39,6 @@ from forestall.worlds.kitchen.placement import (
 from forestall.worlds.kitchen.rendering.appearance import Appearance
 from forestall.worlds.kitchen.spots import YAWS, Found
 
-REACH_M = 1.45
-REACH_ANGLE_RAD = float(np.deg2rad(75))
 HAND_M = (0.45, -0.21, EYE_HEIGHT_M - 0.45)
 """Where the hand is: forward and left (here: right) of the robot's axis, and above the floor."""
 
@@ -132,16 +130,26 @@ class KitchenWorld:
         goal = self.standing_for(name)
         if goal is None:
             return 0.0
+        return self.go_to(goal)
+
+    def turn_to(self, yaw_rad: float) -> float:
+        """Turn on the spot to a heading; returns the simulated seconds."""
+        return self.go_to(Standing(self._robot.x, self._robot.y, yaw_rad))
+
+    def go_to(self, goal: Standing) -> float:
+        """Drive to a pose; returns the simulated seconds."""
         seconds = self._robot.seconds_to(goal)
         self._stand(goal)
         return seconds
 
-    def turn_to(self, yaw_rad: float) -> float:
-        """Turn on the spot to a heading; returns the simulated seconds."""
-        goal = Standing(self._robot.x, self._robot.y, yaw_rad)
-        seconds = self._robot.seconds_to(goal)
-        self._stand(goal)
-        return seconds
+    def lookouts(self, point: Vec3) -> list[Vec3]:
+        """See `stage.Roving`."""
+        return navigation.lookouts(self._free_floor(), self._robot, point)
+
+    def look_from(self, place: Vec3, point: Vec3) -> float:
+        """See `stage.Roving`."""
+        x, y, _ = place
+        return self.go_to(Standing(x, y, float(np.arctan2(point[1] - y, point[0] - x))))
 
     def standing_for(self, name: str) -> Standing | None:
         """Where the robot stands to work at something; None when there is no place."""
@@ -233,17 +241,7 @@ class KitchenWorld:
 
     def reachable_from(self, standing: Standing, name: str) -> bool:
         """Whether `name` could be reached from a standing place."""
-        low, high = self.bodies.box(name)
-        here = np.array([standing.x, standing.y])
-        nearest = np.clip(here, low[:2], high[:2])
-        way = nearest - here
-        distance = float(np.hypot(*way))
-        if distance > REACH_M or low[2] > 2.0:
-            return False
-        if distance < 0.3:
-            return True
-        off = navigation.wrapped(float(np.arctan2(way[1], way[0])) - standing.yaw_rad)
-        return abs(off) <= REACH_ANGLE_RAD
+        return navigation.in_reach(standing, *self.bodies.box(name))
 
     # what stands in the way
 
