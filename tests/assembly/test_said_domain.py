@@ -23,7 +23,7 @@ from forestall.config import DEMONSTRATION_SEEDS
 from forestall.errors import InputError
 from forestall.experiments.conduct import Experiment, conduct
 from forestall.experiments.episodes import KIND, Episodes
-from forestall.experiments.runs import Settings
+from forestall.experiments.settings import Settings
 from forestall.kinds import DOMAIN
 from forestall.types.episode import EpisodeRecord
 

@@ -17,7 +17,8 @@ from forestall.cli.main import call
 from forestall.comparison.options import Feature
 from forestall.experiments.engines import ENGINES
 from forestall.experiments.robustness import DISTURBANCES
-from forestall.experiments.runs import PAGES, PROFILES
+from forestall.experiments.runs import PROFILES
+from forestall.experiments.settings import PAGES
 from forestall.statistics.cases import SPLITS
 from forestall.tasks.files import SETS
 

@@ -16,7 +16,8 @@ from forestall.assembly.configuration import Given
 from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.experiments.conduct import Experiment, conduct, implied
 from forestall.experiments.folder import ABOUT, EFFORT, ROWS, ResultsFolder, episodes_in
-from forestall.experiments.runs import PART, QUICK_TASKS, Choice, Run, Settings, by_scene, runs_for
+from forestall.experiments.runs import PART, QUICK_TASKS, Choice, Run, by_scene, runs_for
+from forestall.experiments.settings import Settings
 from forestall.experiments.worker import Work
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, Case, cases
 from forestall.statistics.rows import EpisodeRow
@@ -119,7 +120,14 @@ def test_what_is_not_possible_is_said_with_what_is() -> None:
         runs_for(Choice("ablations"))
     some = runs_for(Choice("all", sets=("robofail",), strategies=("proactive",)))
     assert {(r.case.set, r.strategy) for r in some} == {("robofail", "proactive")}
-    for wrong in (Choice("all", sets=("robofails",)), Choice("all", strategies=("proactve",))):
+    few = runs_for(Choice("proactive", tasks=("make-coffee",), sets=("robofail", "undisturbed")))
+    assert {r.case.task for r in few} == {"make-coffee"}
+    assert {r.case.set for r in few} == {"robofail", "undisturbed"}
+    for wrong in (
+        Choice("all", sets=("robofails",)),
+        Choice("all", strategies=("proactve",)),
+        Choice("all", tasks=("make-cofee",)),
+    ):
         with pytest.raises(InputError, match="did you mean"):
             runs_for(wrong)
     with pytest.raises(InputError, match="no run of strategy online on undisturbed"):

@@ -14,7 +14,8 @@ from forestall.errors import InputError
 from forestall.experiments.conduct import Experiment, conduct
 from forestall.experiments.episodes import KIND, Episodes, folder_for, parse_seeds, table
 from forestall.experiments.folder import ABOUT, ROWS
-from forestall.experiments.runs import Run, Settings
+from forestall.experiments.runs import Run
+from forestall.experiments.settings import Settings
 from forestall.experiments.worker import Work
 from forestall.statistics.cases import Case
 from forestall.statistics.rows import EpisodeRow

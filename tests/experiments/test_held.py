@@ -10,7 +10,8 @@ import pytest
 
 from forestall.assembly.configuration import Given
 from forestall.domain.model import Domain
-from forestall.experiments.runs import Run, Settings
+from forestall.experiments.runs import Run
+from forestall.experiments.settings import Settings
 from forestall.experiments.worker import Work, config_of, run_one
 from forestall.kinds import LIMIT
 from forestall.statistics.cases import Case

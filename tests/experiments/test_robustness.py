@@ -23,7 +23,7 @@ from forestall.experiments.robustness import (
     present,
     without_sensor,
 )
-from forestall.experiments.runs import Settings
+from forestall.experiments.settings import Settings
 from forestall.experiments.worker import Work, config_of
 from forestall.kinds import SENSOR
 from forestall.sensors import Errors

@@ -16,7 +16,8 @@ from forestall.cli.flags import AblationFlags
 from forestall.experiments.conduct import Experiment, conduct
 from forestall.experiments.folder import episodes_in
 from forestall.experiments.results import present
-from forestall.experiments.runs import Choice, Run, Settings, runs_for
+from forestall.experiments.runs import Choice, Run, runs_for
+from forestall.experiments.settings import Settings
 from forestall.experiments.worker import Work, config_of, prepared_run
 from forestall.kinds import LLM, REASONER, REPLANNER
 from forestall.statistics.cases import Case

@@ -16,7 +16,8 @@ from forestall.assembly.recording import RecordingJob, record_one
 from forestall.cli.main import call
 from forestall.config import DEMONSTRATION_SEEDS
 from forestall.errors import InputError, UnknownNameError
-from forestall.experiments.runs import Run, Settings
+from forestall.experiments.runs import Run
+from forestall.experiments.settings import Settings
 from forestall.experiments.worker import broken_row, prepared_run
 from forestall.llm.explaining import ModelWriter, TemplateWriter
 from forestall.memory.store import open_store

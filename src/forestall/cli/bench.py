@@ -97,7 +97,7 @@ def episodes(
         folder_for,
         parse_seeds,
     )
-    from forestall.experiments.runs import Settings
+    from forestall.experiments.settings import Settings
     from forestall.tasks.files import SETS, scenario_names, task_names
 
     of_sets = {"all": scenario_names(), **{of: scenario_names(of) for of in SETS}}

@@ -33,6 +33,7 @@ class Options:
         jobs: how many episodes at once; one for each core by default.
         limit: at most so many cases of each set, from all tasks in turn; for a first look.
         sets: only cases of these sets; `forestall cases list` names them.
+        tasks: only cases of these; `forestall tasks list` names them.
         strategies: only runs of these: watch (all judges judge), none, retry-once, proactive,
             plan-check, online, online-scene, post-hoc. Without watch there are no figures of
             judges.
@@ -58,6 +59,7 @@ class Options:
     jobs: int | None = None
     limit: int | None = None
     sets: Names = None
+    tasks: Names = None
     strategies: Names = None
     profiles: Names = None
     part: float | None = None
@@ -157,7 +159,8 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
     from forestall.cli.progress import bar
     from forestall.experiments.conduct import Experiment, conduct
     from forestall.experiments.results import present
-    from forestall.experiments.runs import PART, Choice, Settings
+    from forestall.experiments.runs import PART, Choice
+    from forestall.experiments.settings import Settings
 
     settings = Settings(parts.given(), pages=options.pages)
     experiment = Experiment(
@@ -173,6 +176,7 @@ def _experiment(name: str, options: Options, parts: ComparingFlags) -> int:
             options.quick,
             options.demonstrations,
             models=name == "ablation" and settings.asks,
+            tasks=tuple(options.tasks or ()),
         ),
         options.jobs if options.jobs is not None else os.cpu_count() or 1,
         options.engine,

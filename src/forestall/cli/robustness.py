@@ -71,7 +71,7 @@ def robustness(
         present,
         without_sensor,
     )
-    from forestall.experiments.runs import Settings
+    from forestall.experiments.settings import Settings
 
     given = parts.given()
     without_sensor(given.kinds())

@@ -19,13 +19,8 @@ from forestall.errors import InputError, UnknownNameError
 from forestall.experiments.cost import Cost, cost_of
 from forestall.experiments.engines import WorkerDiedError, check_engine, computed, make_lanes
 from forestall.experiments.folder import EXPERIMENT, About, ResultsFolder, episodes_in
-from forestall.experiments.runs import (
-    PAGES,
-    PAPER_DETECTOR,
-    Run,
-    Settings,
-    by_scene,
-)
+from forestall.experiments.runs import PAPER_DETECTOR, Run, by_scene
+from forestall.experiments.settings import PAGES, Settings
 from forestall.experiments.worker import (
     Work,
     broken_row,

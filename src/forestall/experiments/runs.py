@@ -13,12 +13,11 @@ from functools import cache, partial
 from itertools import product
 from typing import Any, TypeVar
 
-from forestall.assembly.configuration import Choice as Part
-from forestall.assembly.configuration import Given, choices, domain_of, said_domain
+from forestall.assembly.configuration import Given
 from forestall.assembly.registry import find
 from forestall.domain.model import Domain
 from forestall.errors import InputError, UnknownNameError
-from forestall.kinds import DETECTOR, LLM, STRATEGY
+from forestall.kinds import STRATEGY
 from forestall.statistics.cases import CASE_SETS, FURTHER_SETS, UNDISTURBED, Case, cases
 from forestall.statistics.judges import THRESHOLDS
 from forestall.statistics.rows import (
@@ -33,12 +32,10 @@ from forestall.statistics.rows import (
     Setup,
 )
 from forestall.statistics.watches import PAPER_SET
+from forestall.tasks.files import task_names
 from forestall.tasks.variation import MOST
 
 EXPERIMENTS = ("proactive", "detection", "ablation", "transfer", "all")
-
-PAGES = ("all", "telling", "none")
-"""Telling are the proactive runs of failing cases, and those in which it raised a false alarm."""
 
 BASELINES = ("objects", "caption", "image")
 
@@ -94,51 +91,6 @@ _WITH_PART = ("transfer", "all")
 
 _ELSEWHERE = " of other tasks"
 """Ends what is said of a memory without the task at hand."""
-
-OWN = (DETECTOR.name, STRATEGY.name)
-"""The kinds of parts that an experiment chooses by itself, run by run."""
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """What is the same for every episode of an experiment.
-
-    Args:
-        given: what was said about the parts; strategy and detector are the experiment's own.
-        pages: which episodes get a page of their own, one of `PAGES`.
-    """
-
-    given: Given = field(default_factory=Given)
-    pages: str = "telling"
-
-    def parts(self) -> tuple[Part, ...]:
-        """The checked choice of every kind but the experiment's own.
-
-        Raises:
-            InputError: one that is not valid, or one that is the experiment's own.
-        """
-        for kind in self.given.kinds():
-            if kind in OWN:
-                raise InputError(f"an experiment chooses the {kind} of each run by itself")
-        return tuple(part for part in choices(self.given) if part.kind not in OWN)
-
-    @property
-    def asks(self) -> bool:
-        """Whether a language model was named."""
-        return self.given.chosen(LLM.name).name != "none"
-
-    def domain(self) -> Domain | None:
-        """The domain that every task is read in, None for their own.
-
-        Raises:
-            InputError: it cannot be read.
-        """
-        said = said_domain(self.given)
-        return None if said is None else domain_of(said)
-
-    def to_json(self) -> dict[str, Any]:
-        """As it stands in the folder of the results."""
-        return {"parts": {p.kind: p.to_json() for p in self.parts()}, "pages": self.pages}
 
 
 @cache
@@ -198,6 +150,7 @@ class Choice:
         rounds: how many scenes each scenario gets.
         limit: cases of each set at most, taken from all tasks in turn; all by default.
         sets: only cases of these; all by default.
+        tasks: only cases of these; all by default.
         strategies: only these; all by default.
         profiles: of the household; by default the honest one, and for "all" both.
         part: of the cases of each set in "all" and "transfer", from all tasks in turn.
@@ -219,6 +172,7 @@ class Choice:
     quick: bool = False
     demonstrations: int | None = None
     models: bool = False
+    tasks: tuple[str, ...] = ()
 
     @property
     def ways(self) -> int:
@@ -236,9 +190,13 @@ class Choice:
         return {"split": self.split, "rounds": self.rounds}
 
     def takes(self, run: Run) -> bool:
-        """Whether a run is among the wanted sets and strategies."""
-        of_set = not self.sets or run.case.set in self.sets
-        return of_set and (not self.strategies or run.strategy in self.strategies)
+        """Whether a run is among the wanted sets, tasks and strategies."""
+        asked = (
+            (self.sets, run.case.set),
+            (self.tasks, run.case.task),
+            (self.strategies, run.strategy),
+        )
+        return all(not some or one in some for some, one in asked)
 
     def households(self) -> tuple[str, ...]:
         """The profiles that it runs in, the honest one first."""
@@ -250,7 +208,7 @@ def runs_for(choice: Choice) -> tuple[Run, ...]:
     """The wanted episodes, each once, the watched run of a case first.
 
     Raises:
-        UnknownNameError: no such experiment, split, set, strategy or profile.
+        UnknownNameError: no such experiment, split, set, task, strategy or profile.
         InputError: a limit below 1, or nothing that fits.
     """
     _check(choice)
@@ -259,7 +217,8 @@ def runs_for(choice: Choice) -> tuple[Run, ...]:
     if not wanted:
         raise InputError(
             f"the experiment {choice.experiment} has no run of strategy "
-            f"{' or '.join(choice.strategies)} on {' or '.join(choice.sets) or 'any set'}"
+            f"{' or '.join(choice.strategies) or 'any kind'} on "
+            f"{' or '.join(choice.sets) or 'any set'} of {' or '.join(choice.tasks) or 'any task'}"
         )
     return wanted
 
@@ -358,6 +317,9 @@ def _check(choice: Choice) -> None:
     for name in choice.sets:
         if name not in (*CASE_SETS, *FURTHER_SETS):
             raise UnknownNameError("set of cases", name, (*CASE_SETS, *FURTHER_SETS))
+    for name in choice.tasks:
+        if name not in task_names():
+            raise UnknownNameError("task", name, task_names())
     for name in choice.profiles:
         if name not in PROFILES:
             raise UnknownNameError("profile of the household", name, PROFILES)

@@ -17,7 +17,8 @@ from forestall.assembly.demonstrations import load_memory
 from forestall.assembly.make import Prepared, make_world, needs_memory, prepare, run_episode
 from forestall.domain.distort import distorted
 from forestall.errors import ForestallError, where
-from forestall.experiments.runs import MODELS, Run, Settings
+from forestall.experiments.runs import MODELS, Run
+from forestall.experiments.settings import Settings
 from forestall.kinds import SENSOR, WORLD
 from forestall.records.derived import adopted, alarms, reasoning_s, replans
 from forestall.records.exchanges import exchanges_of

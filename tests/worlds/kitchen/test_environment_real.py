@@ -1,4 +1,4 @@
-# mypy: disable-error-code="arg-type, union-attr"
+# mypy: disable-error-code="arg-type, union-attr, index, list-item"
 """The rules on the real geometry, seen through the real renderer."""
 
 import numpy as np
