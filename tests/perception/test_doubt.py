@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
@@ -129,3 +130,37 @@ def test_what_shows_of_a_thing_where_it_was_put_is_enough_and_elsewhere_it_is_no
                 if r.subject == "Mug-1" and r.predicate in domain.containing
             ]
             assert at_rest == ([] if place is None else [place])
+
+
+def test_what_was_put_into_something_that_then_fell_shut_is_in_it() -> None:
+    """Nobody sees it any more; the arm knows where it let go."""
+    domain = shipped("household")
+    view = looking((0.0, -0.9, 1.4), (0.0, 0.3, 1.0))
+    inside = (-0.25, 0.2, 0.9), (0.25, 0.5, 1.2)
+    opened = [COUNTER, *hollow("Microwave-1", *inside, open_side="front")]
+    fallen_shut = [COUNTER, Solid("Microwave-1", *inside)]
+    plate = (0.2, 0.2, 0.02)
+    for done, place in ((True, ("inside", "Microwave-1")), (False, ("on_top_of", "CounterTop-1"))):
+        states = {"Microwave-1": {"open": "open"}}
+        eyes = GraphPerceiver(
+            InstanceSegmenter(),
+            GivenStateEstimator(states),
+            domain,
+            gate=None,
+            alters=lambda graph, subtask: [Change("Plate-1", "inside", "", "Microwave-1")],
+        )
+        carried = at("Plate-1", 0.1, -0.3, 1.1, plate, True)
+        held = observed([*opened, carried], view, holding="Plate-1", hand=(0.1, -0.3, 1.2))
+        eyes.perceive(held)
+        eyes.acted(Subtask.parse("put_in(Plate-1, Microwave-1)"), succeeded=done)
+        states["Microwave-1"] = {"open": "closed"}
+        shut = observed(fallen_shut, view, time_s=1.0)
+        hand = replace(shut.gripper, released="Plate-1", released_world_m=(0.0, 0.36, 0.93))
+        for now in (replace(shut, gripper=hand), observed(fallen_shut, view, time_s=2.0)):
+            graph = eyes.perceive(now)
+            found = [
+                (r.predicate, r.object)
+                for r in graph.relations
+                if r.subject == "Plate-1" and r.predicate in domain.containing
+            ]
+            assert found == [place]

@@ -39,7 +39,7 @@ class Options:
             judges.
         profiles: of the household: honest (motions go wrong, the domain file does not know all) or
             kind. Honest by default, both for `all`.
-        part: of the cases of each set in `all`, from all tasks in turn; 0.05 by default, which is
+        part: of the cases of each set in `all`, from all tasks in turn; 0.03 by default, which is
             an hour on two cores, 1 for every case, which takes many.
         quick: a tenth of it, of few tasks in few rooms, with fewer demonstrations and fewer
             strategies on each case: a first look in minutes.

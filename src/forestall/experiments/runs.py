@@ -55,7 +55,7 @@ IRREVERSIBLE = "irreversible"
 DEMONSTRATIONS = 8
 """Of each task in the honest household."""
 
-PART = 0.05
+PART = 0.03
 """Of the cases of each set in "all": an hour on two cores. Of the undisturbed runs of the honest
 household there are all that are another case's twin, too."""
 

@@ -264,7 +264,7 @@ class SceneMemory:
         homeless = {n for n, t in self.tracks.items() if t.parent is None and n not in seen}
         held = {h.holding for h in self._hands if h.holding is not None}
         subjects = (seen | homeless) - held
-        meant = {n: place for n in seen if (place := self.tracks[n].meant) is not None}
+        meant = {n: place for n in subjects if (place := self.tracks[n].meant) is not None}
         found = parents(stack, subjects, meant, self._domain, self._config)
         for name in sorted(subjects):
             track = self.tracks[name]

@@ -38,8 +38,8 @@ def parents(
     Args:
         stack: every located thing.
         subjects: ids whose parent is asked for.
-        meant: where things that are seen were just put, as far as is known. There what is seen of a
-            thing need not have walls found around it, which others may hide.
+        meant: where things were put since they were seen, as far as is known. There a thing need
+            not have walls found around it, which others may hide, and the place may have been shut.
         domain: which receptacle takes what, and how.
         config: thresholds.
     """
@@ -94,8 +94,9 @@ def _parent(
     for r in candidates:
         predicate = offered(domain, stack.things[r].category) or ""
         if domain.predicates[predicate].geometry == CONTAINMENT:
-            within = _within(stack, a, r, share[r], domain, config)
             put = meant == (predicate, stack.things[r].id)
+            shut = stack.things[r].closed and not put
+            within = not shut and _within(stack, a, r, share[r], domain, config)
             if within and (put or _walls(stack, a, r, bottom, config) >= config.enclosed_sectors):
                 holding.append((float(area[r]), predicate, r))
             continue
@@ -195,7 +196,7 @@ def _within(
 ) -> bool:
     """Whether `a` is over the floor of `r` and not over its rim; beside it are perhaps no walls."""
     receptacle = stack.things[r]
-    if receptacle.closed or share < config.inside_share:
+    if share < config.inside_share:
         return False
     z = stack.samples[a][:, 2]
     floor, rim = float(stack.low_m[r, 2]), float(stack.high_m[r, 2])
