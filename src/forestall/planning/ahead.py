@@ -6,6 +6,7 @@ given); calls `validate`, which executes the plan in the domain's model.
 
 from __future__ import annotations
 
+from forestall.domain.facing import way_here
 from forestall.domain.model import Domain
 from forestall.planning.execute import resolve
 from forestall.planning.state import State
@@ -21,15 +22,14 @@ class Foresight:
     Args:
         graph: what is seen.
         plan: at hand.
-        index: of the step that comes next. A drive before it is driven again, since where the robot
-            stands matters.
+        index: of the step that comes next. The way to where the robot stands comes before it.
         domain: skills.
     """
 
     def __init__(self, graph: SceneGraph, plan: Plan, index: int, domain: Domain) -> None:
         self._domain = domain
-        before = index > 0 and domain.drives(plan.subtasks[index - 1])
-        left = plan.subtasks[index - before :]
+        way = way_here(plan.subtasks, index, graph, domain)
+        left, before = (*way, *plan.subtasks[index:]), len(way)
         trace = run(observed(graph, domain), left)
         self._states = trace.states[before:]
         steps = list(trace.meant[before:])

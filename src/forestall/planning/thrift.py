@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from forestall.domain.formula import literals
-from forestall.domain.model import FACING, Domain
+from forestall.domain.facing import minds_facing
+from forestall.domain.model import Domain
 from forestall.planning.driving import landmark_of
 from forestall.planning.needless import Accepts, content, unsafe
 from forestall.planning.robot_time import Aim, Spot, aim, times_s, way_s
@@ -178,7 +178,7 @@ def _assembled(state: State, units: Sequence[_Unit]) -> tuple[tuple[Subtask, ...
     for unit in units:
         to = None if unit.place is None else (unit.place, unit.spot)
         away = to is not None and (at is None or way_s(state.domain, at, to) > 0)
-        if unit.drive is not None and (away or to is None or _faces(state, unit.step)):
+        if unit.drive is not None and (away or to is None or minds_facing(unit.step, state.domain)):
             steps.append(unit.drive)
         elif driving is not None and away and unit.landmark and at is not None:
             steps.append(Subtask(driving.name, (unit.landmark,)))
@@ -187,16 +187,6 @@ def _assembled(state: State, units: Sequence[_Unit]) -> tuple[tuple[Subtask, ...
         if unit.mine:
             mine = len(steps)
     return tuple(steps), mine
-
-
-def _faces(state: State, step: Subtask) -> bool:
-    """Whether it matters to a step what the robot has driven to."""
-    return any(
-        x.predicate == FACING
-        for choice in state.domain.skill(step.skill).deciding
-        for formula in (*choice.among, choice.such_that)
-        for x, _ in literals(formula)
-    )
 
 
 def for_good(before: State, after: State) -> bool:

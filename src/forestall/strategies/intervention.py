@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.brought import came_about
+from forestall.domain.facing import way_here
 from forestall.domain.looked import looked_into, looked_over, missing, not_there
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.undo import irreversible_skills
@@ -382,10 +383,9 @@ def relied_on_now(
 
 def rest_of(context: BoundaryContext, domain: Domain) -> Plan:
     """What is left of the plan, with the drive before it: where the robot stands matters."""
-    start = context.index
-    if start > 0 and domain.drives(context.plan.subtasks[start - 1]):
-        start -= 1
-    return Plan(context.plan.subtasks[start:], context.plan.goal)
+    steps, index = context.plan.subtasks, context.index
+    before = way_here(steps, index, context.graph, domain)
+    return Plan((*before, *steps[index:]), context.plan.goal)
 
 
 def _common_suffix(plan: Plan, context: BoundaryContext) -> int:
