@@ -16,7 +16,7 @@ from forestall.domain.looked import in_sight
 from forestall.domain.model import Domain
 from forestall.perception.config import PerceptionConfig
 from forestall.perception.support import contains
-from forestall.perception.tracks import Track, middle
+from forestall.perception.tracks import Track
 from forestall.perception.unproject import Points
 from forestall.perception.unseen import unshown
 from forestall.types.observation import Vec3
@@ -28,7 +28,7 @@ ALIKE = 0.1
 """Of places from which nearly as much is seen the nearest is the best."""
 
 _MEANT_M = 0.1
-"""How near to a point the middle of the thing must be that is meant by it."""
+"""How near to a point the centroid of the thing must be that is meant by it."""
 _CELL_RAD = np.deg2rad(2.0)
 _SLACK_M = 0.03
 _OWN_SLACK_M = 0.1
@@ -47,7 +47,7 @@ def best_vantage(
 
     Args:
         tracks: everything that is known, by name.
-        points: middles of the things that are looked for, in the world.
+        points: centroids of the things that are looked for, in the world.
         eyes: where the camera could be.
         here: where it is.
         domain: which things are places, and how they take others.
@@ -83,10 +83,10 @@ def best_vantage(
 
 
 def _meant(located: Sequence[Track], points: Sequence[Vec3]) -> list[Track]:
-    """The things whose middles are at the points, each once."""
+    """The things whose centroids are at the points, each once."""
     found: dict[str, Track] = {}
     for point in points:
-        apart = [float(np.linalg.norm(middle(t) - np.asarray(point))) for t in located]
+        apart = [float(np.linalg.norm(t.centroid_m - np.asarray(point))) for t in located]
         nearest = int(np.argmin(apart)) if apart else 0
         if apart and apart[nearest] <= _MEANT_M:
             found[located[nearest].id] = located[nearest]
