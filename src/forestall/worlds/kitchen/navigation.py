@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy import ndimage
 
 from forestall.types.observation import Vec3
 from forestall.worlds.kitchen.forms import Float, Pose, Rect, Stance
@@ -84,6 +83,8 @@ class Floor:
 @lru_cache(maxsize=8)
 def _joined(floor: Floor) -> Any:
     """Label of the connected part of the floor for every cell, 0 where the robot cannot be."""
+    from scipy import ndimage
+
     area = floor.area
     xs = np.arange(area.x0, area.x1, _CELL_M)
     ys = np.arange(area.y0, area.y1, _CELL_M)
