@@ -72,7 +72,7 @@ ABLATED = 0.5
 QUICK = 0.1
 """Of the cases that are run otherwise, in a quick experiment."""
 
-QUICK_TASKS = 3
+QUICK_TASKS = 2
 """Of a quick experiment in the honest household; the longer ones beside. In the kind one 1."""
 
 QUICK_DEMONSTRATIONS = 1
