@@ -71,14 +71,25 @@ class Doubting:
         return StrategyAnswer(Decision.PROCEED)
 
 
-def run(best: int | None) -> tuple[EpisodeRecord, list[str]]:
+class Failing(Doubting):
+    """Breaks on what it sees then."""
+
+    def before_subtask(self, context: BoundaryContext) -> StrategyAnswer:
+        if not context.may_look:
+            raise ZeroDivisionError
+        return super().before_subtask(context)
+
+
+def run(best: int | None, strategy: Doubting | None = None) -> tuple[EpisodeRecord, list[str]]:
     prepared = prepare(run_config(TASK, seed=3, given=SYMBOLIC))
     loaded, domain = prepared.loaded, prepared.loaded.domain
     inner = SymbolicWorld(domain, apply_scene_faults(loaded.task.scene, (), domain))
     perceiver = Assembly(prepared.config.choices, domain, ()).part(PERCEIVER)
     perceiver.best_vantage = lambda eyes, points: best  # type: ignore[attr-defined]
     world = Roving(inner)
-    record = Runtime(world, perceiver, Doubting(), domain).run(loaded.task, prepared.plan, 3)
+    record = Runtime(world, perceiver, strategy or Doubting(), domain).run(
+        loaded.task, prepared.plan, 3
+    )
     return record, world.told
 
 
@@ -92,6 +103,13 @@ def test_the_robot_goes_to_look_again_and_back_before_it_acts() -> None:
         back = told[k + 2 : told.index("execute", k)]
         assert back in (["approach"], []), "and what is done at a place is done from before it"
     assert any(told[k + 2] == "approach" for k in went)
+
+
+def test_a_robot_that_is_held_stays_where_it_looked_from() -> None:
+    record, told = run(1, Failing())
+    assert record.end is EpisodeEnd.HELD and "execute" not in told
+    (went,) = (k for k, what in enumerate(told) if what == "look from 1")
+    assert told[went + 1 :] == ["scan"], "nothing moves it any more"
 
 
 def test_where_no_place_is_better_it_stays() -> None:

@@ -332,7 +332,7 @@ class Runtime:
             decision = ask(observation)
             self._note(episode, decision)
             if decision.outcome is not Outcome.LOOK:
-                if moved:
+                if moved and decision.may_start:  # who is held does not drive
                     self._approach()
                 return decision
             with self._monitor.phase("observe"):

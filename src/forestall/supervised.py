@@ -71,8 +71,7 @@ class SupervisedWorld:
         world = self._environment
         if not isinstance(world, Vantages):
             return ()
-        offered = self._calls.call("vantages", lambda: world.vantages(point), "observe")
-        return tuple(offered)
+        return self._calls.call("vantages", lambda: tuple(world.vantages(point)), "observe")
 
     def look_from(self, place: Vec3, point: Vec3) -> None:
         """Bring the camera to one of them."""
