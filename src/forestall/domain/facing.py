@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from forestall.domain.formula import literals
+from forestall.domain.formula import asks
 from forestall.domain.model import FACING, Domain
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
@@ -22,10 +22,7 @@ def minds_facing(step: Subtask, domain: Domain) -> bool:
     """
     skill = domain.skills.get(step.skill)
     return skill is not None and any(
-        x.predicate == FACING
-        for choice in skill.deciding
-        for formula in (*choice.among, choice.such_that)
-        for x, _ in literals(formula)
+        asks((*choice.among, choice.such_that), FACING) for choice in skill.deciding
     )
 
 

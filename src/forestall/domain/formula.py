@@ -13,7 +13,7 @@ Quantifiers reach as far to the right as they can. Called by the loaders; calls 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from forestall.errors import InputError
@@ -131,6 +131,11 @@ def bind(formula: Formula, names: Mapping[str, str]) -> Formula:
     own = {v.name for v in formula.variables}
     inner = {k: v for k, v in names.items() if k not in own}
     return type(formula)(formula.variables, bind(formula.part, inner))
+
+
+def asks(formulas: Iterable[Formula], predicate: str) -> bool:
+    """Whether formulas speak of a predicate."""
+    return any(x.predicate == predicate for f in formulas for x, _ in literals(f))
 
 
 def literals(formula: Formula) -> Iterator[tuple[Literal, bool]]:

@@ -5,11 +5,10 @@ Called by `ground`; calls `grounder` and `schemas`.
 
 from __future__ import annotations
 
-from forestall.domain.formula import Formula
+from forestall.domain.formula import Formula, asks
 from forestall.domain.model import FACING
 from forestall.domain.schema import Choice, Skill
 from forestall.planning.grounder import Grounder
-from forestall.planning.needs import asks
 from forestall.planning.nodes import Node, all_of, any_of, negate
 from forestall.types.facts import by_number
 

@@ -16,9 +16,10 @@ from forestall.domain.formula import (
     Not,
     Or,
     Some,
+    asks,
 )
 from forestall.domain.schema import Copy, PredicateKind, Process, Skill
-from forestall.planning.needs import asks, conjuncts
+from forestall.planning.needs import conjuncts
 from forestall.planning.possible import Names, Possible, Way
 from forestall.planning.state import State
 from forestall.types.facts import Literal, by_number

@@ -71,11 +71,6 @@ def asks_relation(domain: Domain, formula: Formula) -> bool:
     )
 
 
-def asks(formulas: Iterable[Formula], predicate: str) -> bool:
-    """Whether formulas speak of a predicate."""
-    return any(x.predicate == predicate for f in formulas for x, _ in literals(f))
-
-
 def useful(domain: Domain, goal: Iterable[Formula]) -> frozenset[str]:
     """Skills on which a goal can depend at all, by the predicates that they change and ask for."""
     relevant: set[str] = set()
