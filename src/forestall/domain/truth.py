@@ -192,8 +192,12 @@ def is_shut(domain: Domain, category: str, states: Mapping[str, str | None]) -> 
     shut = domain.roles.shut
     if shut is None or not domain.is_a(category, domain.roles.encloses):
         return Truth.FALSE
-    alone = SceneGraph((ObjectNode("it", category, tuple(states.items())),))
-    return GraphView(alone, domain).truth(Literal(shut, ("it",)))
+    told = category, tuple(states.items())
+    known: dict[object, Truth] = domain.__dict__.setdefault("_shut", {})
+    if told not in known:
+        alone = SceneGraph((ObjectNode("it", category, told[1]),))
+        known[told] = GraphView(alone, domain).truth(Literal(shut, ("it",)))
+    return known[told]
 
 
 def formula_truth(graph: SceneGraph, formula: Formula, domain: Domain) -> Truth:

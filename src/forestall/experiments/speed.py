@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from forestall.assembly.configuration import run_config
+from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.demonstrations import load_memory
 from forestall.assembly.make import make_world, prepare, run_episode
 from forestall.assembly.parts import Assembly
@@ -52,6 +52,9 @@ GROUPS = ("pictures and graphs", "comparisons", "boundaries", "plans", "episodes
 
 THINGS = 200
 """In the yard in which is planned."""
+
+_STATELESS = Given.named({"states": "given"})
+"""States that come with the masks, of which these have none."""
 
 STORED = 1000
 """Demonstrations in the memory against which a boundary is judged."""
@@ -202,6 +205,12 @@ def _pictures(repeat: int, seed: int) -> list[dict[str, Any]]:
         full = replace(around, frames=(around.frames[counts.index(masks)],))
         times = _timed(repeat, lambda: perceiver.perceive(full))
         rows.append(_row(f"frame → graph ({masks} masks)", "ms", times, 60))
+        without = run_config(TASK, given=_STATELESS).choices
+        stateless = Assembly(without, loaded.domain, lent={"states": {}})
+        geometry = stateless.part(PERCEIVER)
+        geometry.perceive(around)
+        times = _timed(repeat, lambda: geometry.perceive(full))
+        rows.append(_row(f"frame → graph, no states ({masks} masks)", "ms", times, 25))
         seen = environment.observe((focus,))  # of now: time does not run back
         graph = perceiver.perceive(seen)
         subtask = Subtask(step.skill, (thing, place))

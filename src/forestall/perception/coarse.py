@@ -111,38 +111,36 @@ class Coarse:
 
     @cached_property
     def _surface(self) -> tuple[Points, Flags]:
-        p, z = self.points_world_m, self.depth_m
-        a = p[1:-1, 2:] - p[1:-1, :-2]
-        b = p[2:, 1:-1] - p[:-2, 1:-1]
-        normal = np.stack(
-            [
-                b[..., 1] * a[..., 2] - b[..., 2] * a[..., 1],
-                b[..., 2] * a[..., 0] - b[..., 0] * a[..., 2],
-                b[..., 0] * a[..., 1] - b[..., 1] * a[..., 0],
-            ],
-            axis=-1,
-        )
-        length = np.sqrt((normal * normal).sum(axis=-1))
+        p, z = np.ascontiguousarray(np.moveaxis(self.points_world_m, -1, 0)), self.depth_m
+        ax, ay, az = p[:, 1:-1, 2:] - p[:, 1:-1, :-2]
+        bx, by, bz = p[:, 2:, 1:-1] - p[:, :-2, 1:-1]
+        normal = np.stack([by * az - bz * ay, bz * ax - bx * az, bx * ay - by * ax])
+        length = np.sqrt((normal * normal).sum(axis=0))
         here = z[1:-1, 1:-1]
         sides = (z[1:-1, 2:], z[1:-1, :-2], z[2:, 1:-1], z[:-2, 1:-1])
         smooth = (here > 0) & (length > 0)
         for side in sides:
             smooth &= (side > 0) & (np.abs(side - here) < _STEEP * here)
-        normal /= np.maximum(length, 1e-300)[..., None]
-        away = ((self.frame.camera_to_world[:3, 3] - p[1:-1, 1:-1]) * normal).sum(axis=-1) < 0
-        normal[away] *= -1.0
-        return normal, smooth
+        normal /= np.maximum(length, 1e-300)
+        eye = self.frame.camera_to_world[:3, 3]
+        away = ((eye[:, None, None] - p[:, 1:-1, 1:-1]) * normal).sum(axis=0) < 0
+        normal *= np.where(away, -1.0, 1.0)
+        return np.ascontiguousarray(np.moveaxis(normal, 0, -1)), smooth
 
-    def normals(self, labels: Sequence[int] | None = None) -> Points:
+    def normals(self, most: int, labels: Sequence[int] | None = None) -> Points:
         """(n, 3) unit directions of the surfaces, towards the camera.
 
         Args:
+            most: about so many, evenly over the picture; fewer than twice as many are all given.
             labels: only of these; None for the whole picture.
         """
         normal, smooth = self._surface
         if labels is not None:
-            smooth = smooth & np.isin(self.labels[1:-1, 1:-1], labels)
-        found: Points = normal[smooth]
+            asked = np.zeros(len(self.categories) + 1, dtype=np.bool_)
+            asked[list(labels)] = True
+            smooth = smooth & asked.take(self.labels[1:-1, 1:-1])
+        at = np.flatnonzero(smooth)
+        found: Points = normal.reshape(-1, 3)[at[:: max(1, len(at) // most)]]
         return found
 
     def cells(self, label: int) -> Flags:

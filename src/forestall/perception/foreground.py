@@ -23,6 +23,8 @@ from forestall.types.observation import Depth, Frame
 Flags = npt.NDArray[np.bool_]
 Index = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float32]
+Depths = npt.NDArray[np.uint8]
+Pairs = tuple[Index, npt.NDArray[np.int32]]
 
 _NOISE_ROWS = 16
 _SECOND_DIFFERENCE = 0.6745 * np.sqrt(6.0)  # its median, by the deviation of one value
@@ -118,7 +120,7 @@ class _Rim:
     ) -> _Rim | None:
         """Those masks for which `meant` is true; None where none is there."""
         thin = labels[::step, ::step]
-        mine = np.append(meant, False)[thin]
+        mine = np.append(meant, False).take(thin)
         rows, columns = np.flatnonzero(mine.any(axis=1)), np.flatnonzero(mine.any(axis=0))
         if len(rows) == 0:
             return None
@@ -127,11 +129,11 @@ class _Rim:
         window = np.s_[top : int(rows[-1]) + around + 1, left : int(columns[-1]) + around + 1]
         thin, mine = thin[window], mine[window]
         depth = frame.depth_m[::step, ::step][window]
-        deep = _depths(thin)
+        wide = min(-(-config.rim_px // step), np.iinfo(np.uint8).max)
+        deep = _depths(thin, wide)
         inside = mine & (depth > 0)
-        wide = -(-config.rim_px // step)
         level = _levels(thin, deep, inside, len(meant), wide, config)
-        core: Flags = inside & (deep >= np.append(level, 0)[thin])
+        core: Flags = inside & (deep >= np.append(level, 0).astype(np.uint8).take(thin))
         blind = mine & (depth <= 0) & (deep < wide) & (step > 1)
         rim = inside & ~core
         return cls(frame, thin, depth, top, left, step, movable, rim, core, blind, config)
@@ -157,9 +159,6 @@ class _Rim:
         The last says whether what is around is another movable thing's mask. Neighbours are joined
         if no surface but a very steep one has the step between them, noise allowed for.
         """
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         labels, depth = self.labels.ravel(), self.depth.ravel()
         core = self.core.ravel()
         height, width = self.labels.shape
@@ -173,7 +172,7 @@ class _Rim:
         by_thing = np.zeros(len(index), dtype=np.bool_)
         movable = np.append(self.movable, False)
         seeded = np.zeros(len(index), dtype=np.bool_)
-        ones, others = [], []
+        linked = []
         for within, offset in (
             (column + 1 < width, 1),
             (column > 0, -1),
@@ -184,18 +183,15 @@ class _Rim:
             far = depth[beside]
             joined = within & (np.abs(far - z) <= least) & (far > 0)
             same = labels[beside] == own
-            entered |= joined & ~same
-            by_thing |= joined & ~same & movable[labels[beside]]
+            other = np.flatnonzero(joined & ~same)
+            entered[other] = True
+            by_thing[other] |= movable[labels[beside[other]]]
             joined &= same
             seeded |= joined & core[beside]
             if offset > 0:
                 pair = np.flatnonzero(joined & (node[beside] >= 0))
-                ones.append(pair)
-                others.append(node[beside[pair]])
-        one, other = np.concatenate(ones), np.concatenate(others)
-        size = len(index)
-        links = coo_matrix((np.ones(len(one), dtype=np.int8), (one, other)), shape=(size, size))
-        pieces, piece = connected_components(links, directed=False)
+                linked.append((pair, node[beside[pair]]))
+        pieces, piece = _pieces(len(index), *linked)
         has = np.zeros((3, pieces), dtype=np.bool_)
         for which, flags in enumerate((seeded, entered, by_thing)):
             has[which, piece[flags]] = True
@@ -216,7 +212,7 @@ class _Rim:
             around, rough_m, middle_m = self._around(int(owner[start]), some, high)
             if around is None:
                 continue
-            far = float(np.median(depth[some]))
+            far = _median(depth[some])
             slack = max(self.config.level_m, 2.5 * noise * far * far, 2.5 * rough_m)
             if middle_m - around > slack + self.config.flat_m:
                 gone[some[np.abs(high.ravel()[some] - around) <= slack]] = True
@@ -246,7 +242,7 @@ class _Rim:
         if not mine.any():
             return None, 0.0, 0.0
         own = high[box][mine]
-        low, middle = float(own.min()), float(np.median(own))
+        low, middle = float(own.min()), _median(own)
         near = high[box][beside]
         near = near[np.abs(near - low) < config.ring_m]
         if len(near) < config.ring_pixels:
@@ -258,7 +254,7 @@ class _Rim:
         level = near[np.abs(cells - best) <= 2]
         if len(level) < config.level_share * len(near):
             return None, 0.0, middle
-        return float(np.median(level)), float(level.std()), middle
+        return _median(level), float(level.std()), middle
 
     def _astray(self, strays: Index, behind_m: float | None, gone: Flags) -> None:
         """Mark what is farther from the core, along the line of sight, than the thing is wide.
@@ -282,10 +278,38 @@ class _Rim:
             gone[mine[(before > wide) | (behind > (wide if behind_m is None else behind_m))]] = True
 
 
-def _depths(labels: Labels) -> npt.NDArray[np.int32]:
-    """(h, w) how many pixels each one lies from the outline of its mask, 0 on it."""
-    from scipy.ndimage import distance_transform_cdt
+def _median(values: Floats) -> float:
+    """As numpy has it, for some of which none is nan and that are few: its checks take longer."""
+    half = len(values) // 2
+    first = half - 1 + len(values) % 2
+    return float(np.partition(values, (first, half))[first : half + 1].mean())
 
+
+def _pieces(count: int, across: Pairs, down: Pairs) -> tuple[int, npt.NDArray[np.int32]]:
+    """How many connected pieces some pixels make, and of which one each of them is.
+
+    Args:
+        count: of the pixels, row by row.
+        across: which of them are linked with the next one.
+        down: which are linked with one of the next row.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    begins = np.ones(count, dtype=np.int32)
+    begins[across[1]] = 0
+    run = np.cumsum(begins, dtype=np.int32) - 1  # pieces of one row, of which there are few
+    one, other = run[down[0]], run[down[1]]
+    fresh = np.flatnonzero((np.diff(one, prepend=-1) != 0) | (np.diff(other, prepend=-1) != 0))
+    runs = int(run[-1]) + 1
+    ends = np.searchsorted(one[fresh], np.arange(runs + 1, dtype=np.int32))  # in order of runs
+    links = csr_array((np.ones(len(fresh)), other[fresh], ends), shape=(runs, runs))
+    pieces, piece = connected_components(links, directed=False)
+    return int(pieces), piece[run]
+
+
+def _depths(labels: Labels, most: int) -> Depths:
+    """(h, w) pixels from each one to the outline of its mask, 0 on it, `most` at most."""
     inner = np.ones(labels.shape, dtype=np.bool_)
     across = labels[:, 1:] == labels[:, :-1]
     down = labels[1:] == labels[:-1]
@@ -293,15 +317,21 @@ def _depths(labels: Labels) -> npt.NDArray[np.int32]:
     inner[:, :-1] &= across
     inner[1:] &= down
     inner[:-1] &= down
-    if inner.all():
-        return np.full(labels.shape, max(labels.shape), dtype=np.int32)
-    deep: npt.NDArray[np.int32] = distance_transform_cdt(inner, metric="chessboard")
+    deep: Depths = np.zeros(labels.shape, dtype=np.uint8)
+    for _ in range(most):
+        deep += inner.view(np.uint8)
+        rows = inner.copy()
+        rows[1:] &= inner[:-1]
+        rows[:-1] &= inner[1:]
+        inner = rows.copy()
+        inner[:, 1:] &= rows[:, :-1]
+        inner[:, :-1] &= rows[:, 1:]
     return deep
 
 
 def _levels(
     labels: Labels,
-    deep: npt.NDArray[np.int32],
+    deep: Depths,
     inside: Flags,
     count: int,
     wide: int,
@@ -309,7 +339,7 @@ def _levels(
 ) -> Index:
     """For each mask, how deep its core begins: as deep as leaves a share of it."""
     steps = wide + 1
-    key = labels[inside].astype(np.int64) * steps + np.minimum(deep[inside], wide)
+    key = labels[inside].astype(np.int64) * steps + deep[inside]
     held = np.bincount(key, minlength=count * steps).reshape(count, steps)
     held = held[:, ::-1].cumsum(axis=1)[:, ::-1]
     enough = held >= config.core_share * held[:, :1]

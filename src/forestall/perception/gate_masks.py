@@ -58,7 +58,7 @@ def _alignment(
         return
     bends = _bends(look, limits.edge_step)
     near = limits.near_cells
-    here = _hit(bends, outline, near)
+    here = _hit(bends, outline, near, limits.sure_hit)
     if here >= limits.sure_hit:
         return
     turned = {
@@ -66,7 +66,7 @@ def _alignment(
         "mirrored": outline[:, ::-1],
         "turned by half": outline[::-1, ::-1],
     }
-    fits = {name: _hit(bends, cells, near) for name, cells in turned.items()}
+    fits = {name: _hit(bends, cells, near, 1.0) for name, cells in turned.items()}
     shift, best = _shifted(bends, outline, limits)
     pixels = f"shifted by ({shift[0] * look.step}, {shift[1] * look.step}) pixels"
     fits[pixels] = best
@@ -110,25 +110,27 @@ def _bends(look: Coarse, step: float) -> Cells:
     return found
 
 
-def _hit(bends: Cells, outline: Cells, reach: int) -> float:
-    """Largest share of an outline on bends over the shifts of at most `reach` cells."""
+def _hit(bends: Cells, outline: Cells, reach: int, enough: float) -> float:
+    """Largest share of an outline on bends over the shifts of at most `reach` cells.
+
+    The first one that is enough will do; the near shifts are looked at first.
+    """
     height, width = bends.shape
     inner = outline[reach : height - reach, reach : width - reach]
     total = float(inner.sum())
     if total == 0.0:
         return 0.0
-    span = range(2 * reach + 1)
-    best = max(
-        float(
-            np.vdot(
-                inner,
-                bends[dy : dy + inner.shape[0], dx : dx + inner.shape[1]],
-            )
-        )
-        for dy in span
-        for dx in span
-    )
-    return best / total
+    best = 0.0
+    for dy, dx in sorted(np.ndindex(2 * reach + 1, 2 * reach + 1), key=lambda s: _far(s, reach)):
+        over = bends[dy : dy + inner.shape[0], dx : dx + inner.shape[1]]
+        best = max(best, float(np.vdot(inner, over)) / total)
+        if best >= enough:
+            break
+    return best
+
+
+def _far(shift: tuple[int, ...], reach: int) -> int:
+    return sum(abs(s - reach) for s in shift)
 
 
 def _shifted(bends: Cells, outline: Cells, limits: GateConfig) -> tuple[tuple[int, int], float]:

@@ -40,11 +40,12 @@ def judge_scene(
     limits: GateConfig,
 ) -> Iterator[Finding]:
     """Gravity, and where a domain says more: supports, the floor, sizes."""
-    leaning = _gravity(look, limits)
+    normals = look.normals(_PATCHES)
+    leaning = _gravity(look, normals, limits)
     if leaning is not None:
         yield Finding("pose", leaning, index)
     else:
-        yield from _lean(look, index, limits)
+        yield from _lean(normals, index, limits)
     if domain is None:
         return
     if leaning is None:
@@ -90,13 +91,8 @@ def _level(normals: Points, directions: Points, limits: GateConfig) -> tuple[Poi
     return flat, flat + upright
 
 
-def _thinned(normals: Points) -> Points:
-    return normals[:: max(1, len(normals) // _PATCHES)]
-
-
-def _gravity(look: Coarse, limits: GateConfig) -> str | None:
+def _gravity(look: Coarse, normals: Points, limits: GateConfig) -> str | None:
     """A sentence where the room as a whole leans, or is seen from below."""
-    normals = _thinned(look.normals())
     if len(normals) < limits.min_normals:
         return None
     if _from_below(look, normals, limits):
@@ -118,9 +114,8 @@ def _gravity(look: Coarse, limits: GateConfig) -> str | None:
     return None
 
 
-def _lean(look: Coarse, index: int, limits: GateConfig) -> Iterator[Finding]:
+def _lean(normals: Points, index: int, limits: GateConfig) -> Iterator[Finding]:
     """The angle between the stated gravity and that of the planes, where both are near."""
-    normals = _thinned(look.normals())
     if len(normals) < limits.min_normals:
         return
     up = _planes_up(normals, limits)
@@ -170,7 +165,7 @@ def _from_below(look: Coarse, normals: Points, limits: GateConfig) -> bool:
 def _supports(look: Coarse, index: int, domain: Domain, limits: GateConfig) -> Iterator[Finding]:
     """What things are put on lies flat and is seen from above."""
     labels = [i for i, c in enumerate(look.categories) if domain.is_open_support(c)]
-    normals = _thinned(look.normals(labels)) if labels else np.zeros((0, 3))
+    normals = look.normals(_PATCHES, labels) if labels else np.zeros((0, 3))
     if len(normals) < limits.min_normals:
         return
     flat, _ = _level(normals, _UPWARDS, limits)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -63,7 +64,8 @@ class Stack:
             return cls((), empty, empty, np.zeros((0, 16)), ())
         outlines = [sampled(t.points_world_m, _OUTLINE)[:, :2] for t in ordered]
         starts = np.concatenate([[0], np.cumsum([len(o) for o in outlines])[:-1]])
-        reach = np.maximum.reduceat(np.concatenate(outlines) @ DIRECTIONS, starts, axis=0)
+        along = DIRECTIONS.T @ np.concatenate(outlines).T
+        reach = np.ascontiguousarray(np.maximum.reduceat(along, starts, axis=1).T)
         return cls(
             things=ordered,
             low_m=np.stack([t.low_m for t in ordered]),
@@ -94,8 +96,13 @@ def sampled(points_m: Points, most: int = _SAMPLES) -> Points:
     """At most `most` points, evenly over the stored order."""
     if len(points_m) <= most:
         return points_m
-    picked: Points = points_m[np.linspace(0, len(points_m) - 1, most).astype(np.int64)]
+    picked: Points = points_m[_evenly(len(points_m), most)]
     return picked
+
+
+@lru_cache(maxsize=1024)
+def _evenly(count: int, most: int) -> npt.NDArray[np.int64]:
+    return np.linspace(0, count - 1, most).astype(np.int64)
 
 
 def filled(one_m: Points, other_m: Points) -> float:

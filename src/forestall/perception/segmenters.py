@@ -40,6 +40,8 @@ class InstanceSegmenter:
                 f"{len(frame.instance_names)} names are given"
             )
         found = np.flatnonzero(counts >= self._config.min_pixels)
+        if len(counts) <= np.iinfo(np.int16).max:
+            ids = ids.astype(np.int16)  # half as much to compare, once for each instance
         order = sorted((frame.instance_names[int(i)], int(i)) for i in found)
         return [
             Detection(category_of(n), ids == i, n if is_instance(n) else None) for n, i in order

@@ -188,7 +188,7 @@ def _sampled_pixels(
     """Flat indices and labels of the pixels that are unprojected."""
     table = np.append(low_bits, 0).astype(np.uint16)
     lattice = _lattice(frame.intrinsics.width, frame.intrinsics.height)
-    keep = (lattice & table[flat]) == 0
+    keep = (lattice & table.take(flat)) == 0
     keep &= flat >= 0
     keep &= frame.depth_m.ravel() > 0
     index = np.flatnonzero(keep)
@@ -196,7 +196,7 @@ def _sampled_pixels(
 
 
 def _to_world(frame: Frame, index: npt.NDArray[np.int64]) -> Points:
-    rays = _each_ray(frame.intrinsics)[index]
+    rays = _each_ray(frame.intrinsics).take(index, axis=0)
     depth = frame.depth_m.ravel()[index]
     local = np.empty((len(index), 3))
     local[:, :2] = rays * depth[:, None]

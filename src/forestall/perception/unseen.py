@@ -38,9 +38,11 @@ def look_over(
         if place.points_world_m is None or not in_sight(place.category, domain):
             continue
         cells = _unshown(place, config)
-        if len(cells):
-            seen = _seen(_over(cells, place, domain, config), views, config)
-            place.shown = np.union1d(place.shown, _keys(cells[seen]))
+        if len(cells) == 0:
+            continue
+        seen = _seen(_over(cells, place, domain, config), views, config)
+        if seen.any():
+            place.shown = np.union1d(place.shown, _keys(*cells[seen].T))
 
 
 def unshown(place: Track, domain: Domain, config: PerceptionConfig) -> Points:
@@ -50,8 +52,20 @@ def unshown(place: Track, domain: Domain, config: PerceptionConfig) -> Points:
 
 def _unshown(place: Track, config: PerceptionConfig) -> Cells:
     """(n, 2) cells of a place that no view has shown."""
-    cells = _cells(place, config).reshape(-1, 2)
-    return cells[~np.isin(_keys(cells), place.shown)]
+    x, y = _lattice(place, config)
+    row, column = np.nonzero(_unseen(x, y, place))
+    return np.column_stack([x[row], y[column]])
+
+
+def _unseen(x: Cells, y: Cells, place: Track) -> npt.NDArray[np.bool_]:
+    """(nx, ny) which cells of a lattice no view of a place has shown."""
+    keys = _keys(x[:, None], y[None, :])
+    if len(place.shown) == 0:
+        return np.ones(keys.shape, dtype=np.bool_)
+    unseen: npt.NDArray[np.bool_] = (
+        place.shown.take(np.searchsorted(place.shown, keys), mode="clip") != keys
+    )
+    return unseen
 
 
 def _over(cells: Cells, place: Track, domain: Domain, config: PerceptionConfig) -> Points:
@@ -96,11 +110,11 @@ def unseen_m2(place: Track, taken: Taken, domain: Domain, config: PerceptionConf
 
     if place.points_world_m is None or not in_sight(place.category, domain):
         return 0.0
-    lattice = _cells(place, config)
-    unseen = ~np.isin(_keys(lattice), place.shown)
+    x, y = _lattice(place, config)
+    unseen = _unseen(x, y, place)
     if not unseen.any():
         return 0.0
-    first, shape = lattice[0, 0], unseen.shape
+    first, shape = np.array([x[0], y[0]]), unseen.shape
     above = taken.low_m[:, 2] > place.high_m[2] + config.cell_m
     below = taken.high_m[:, 2] < _level_m(place, domain)
     over = (taken.ids != place.id) & ~above & ~below
@@ -133,15 +147,15 @@ def _level_m(place: Track, domain: Domain) -> float:
     return float((place.low_m if contains(place.category, domain) else place.high_m)[2])
 
 
-def _cells(place: Track, config: PerceptionConfig) -> Cells:
-    """(nx, ny, 2) cells of the lattice whose middles lie over a place."""
+def _lattice(place: Track, config: PerceptionConfig) -> tuple[Cells, Cells]:
+    """(nx,) and (ny,) coordinates of the cells whose middles lie over a place."""
     a = np.ceil(place.low_m[:2] / config.cell_m - 0.5).astype(np.int64)
     b = np.floor(place.high_m[:2] / config.cell_m - 0.5).astype(np.int64)
     x, y = (np.arange(a[k], max(a[k], b[k]) + 1) for k in range(2))
-    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    return x, y
 
 
-def _keys(cells: Cells) -> Cells:
-    """One number for each cell."""
-    keys: Cells = cells[..., 0] * (2 * _FAR) + cells[..., 1] + _FAR
+def _keys(x: Cells, y: Cells) -> Cells:
+    """One number for each cell, from its coordinates."""
+    keys: Cells = x * (2 * _FAR) + y + _FAR
     return keys

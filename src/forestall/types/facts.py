@@ -90,6 +90,7 @@ class Literal:
         return Literal(self.predicate, tuple(names.get(a, a) for a in self.args), self.value)
 
 
+@lru_cache(maxsize=4096)
 def category_of(name: str) -> str:
     """The category part of an instance name: "Tray-4" → "Tray"."""
     head, _, tail = name.rpartition("-")

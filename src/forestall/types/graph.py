@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from forestall.errors import FileFormatError, InputError
@@ -124,6 +125,9 @@ class Relation:
         return f"{self.subject} {self.predicate.replace('_', ' ')} {self.object}"
 
 
+_IN_ORDER = attrgetter("subject", "predicate", "object")
+
+
 @dataclass(frozen=True, slots=True)
 class SceneGraph:
     """Objects, the gripper, relations, and one subtask node tied to nothing.
@@ -146,7 +150,7 @@ class SceneGraph:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", tuple(sorted(self.nodes, key=lambda n: n.id)))
-        object.__setattr__(self, "relations", tuple(sorted(set(self.relations))))
+        object.__setattr__(self, "relations", tuple(sorted(set(self.relations), key=_IN_ORDER)))
         object.__setattr__(self, "hidden", tuple(sorted(set(self.hidden))))
         ids = {n.id for n in self.nodes}
         if len(ids) != len(self.nodes):
