@@ -9,7 +9,7 @@ from forestall.planning.search import SearchConfig
 from forestall.planning.validate import GraphValidator, observed, run
 from forestall.replanning.symbolic import PlannerReplanner
 from forestall.types.facts import Literal, category_of
-from forestall.types.plan import Plan
+from forestall.types.plan import Plan, Subtask
 from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome
 from planning.corpus import DOMAIN, GOALS, PLANS, home_of, plan, scene
 from planning.episodes import context
@@ -433,3 +433,51 @@ def test_a_burner_that_nothing_needs_stays_off_after_the_detour() -> None:
     texts = answer.plan.texts()
     assert texts.index("toggle_off(StoveBurner-2)") < texts.index("toggle_on(Faucet-1)")
     assert "toggle_on(StoveBurner-2)" not in texts
+
+
+def mended(step: str | None, refused: tuple[Subtask, ...] = ()) -> list[str]:
+    """What is done, knife in hand, about a bowl before the slices, which a step minds."""
+    current = PLANS["make-salad"]
+    index = current.texts().index("slice_obj(Potato)")
+    graph = scene(
+        home_of("make-salad"),
+        "Knife-1 held, LettuceSliced-1 on CounterTop-1, Bowl-1 on CounterTop-1",
+        "Potato-1 on CounterTop-1, Tomato-1 on CounterTop-1, Bowl-1 blocks LettuceSliced-1",
+    )
+    graph = replace(
+        graph,
+        nodes=tuple(n for n in graph.nodes if n.id != "Lettuce-1"),
+        relations=tuple(r for r in graph.relations if r.subject != "Lettuce-1"),
+    )
+    diagnosis = Diagnosis(
+        "the bowl stands in front of the lettuce",
+        (Literal.parse("unblocked(LettuceSliced-1)"),),
+        step=None if step is None else Subtask.parse(step),
+        refusal="" if step is None else "Bowl-1 stands in front of LettuceSliced-1",
+    )
+    at = replace(context("make-salad", current, index, graph), refused=refused)
+    answer = PlannerReplanner(VALIDATOR, DOMAIN, SearchConfig(time_limit_s=60.0)).replan(
+        at, diagnosis
+    )
+    assert answer.plan is not None, answer.note
+    check = VALIDATOR.check(answer.plan, graph, GOALS["make-salad"])
+    assert check.ok, check.reason
+    return [s.skill if s.args[0] != "Knife-1" else f"{s.skill} knife" for s in answer.plan]
+
+
+def test_what_a_later_step_minds_is_mended_when_the_hands_are_empty() -> None:
+    done = mended("pick_up(LettuceSliced)")
+    assert done[:2] == ["slice_obj", "slice_obj"], "the knife is in the hand for both"
+    assert done.count("put_on knife") == 1
+    assert "pick_up knife" not in done
+
+
+def test_what_the_step_at_hand_minds_is_mended_at_once() -> None:
+    for done in (mended(None), mended("slice_obj(Potato)")):
+        assert "put_on knife" in done[: done.index("slice_obj")]
+        assert "pick_up knife" in done
+
+
+def test_nothing_waits_once_the_robot_has_refused_something() -> None:
+    done = mended("pick_up(LettuceSliced)", (Subtask("put_on", ("Bowl-1", "StoveBurner-1")),))
+    assert "put_on knife" in done[: done.index("slice_obj")]

@@ -14,7 +14,7 @@ from forestall.deadline import TimeUp
 from forestall.planning.needless import content, pruned, unsafe
 from forestall.planning.robot_time import Spot, robot_time_s
 from forestall.planning.state import State
-from forestall.planning.thrift import cost_s, for_good, thrifty
+from forestall.planning.thrift import WORTH_S, cost_s, for_good, thrifty
 from forestall.planning.validate import run
 from forestall.replanning.kept import hand
 from forestall.replanning.searching import as_usual
@@ -85,6 +85,21 @@ def cheaper(asked: Asked, found: Replan, rest: int) -> Replan:
         if thrifty(asked.state, shortest, mine, accepts, asked.start) != steps:
             pruned(asked.state, shortest, mine, accepts)
     return best
+
+
+def less_of_time(one: Replan, other: Replan | None, state: State, start: Spot | None) -> Replan:
+    """The plan that costs the robot less; the first one where there is no other or it is as good.
+
+    Args:
+        one: an accepted plan.
+        other: another one.
+        state: that both start from.
+        start: where the robot stands, x and y in metres.
+    """
+    if one.plan is None or other is None or other.plan is None:
+        return one
+    one_s, other_s = (cost_s(run(state, r.plan.subtasks), start) for r in (one, other) if r.plan)
+    return other if other_s < one_s - WORTH_S else one
 
 
 def _ended_first(asked: Asked, steps: Steps, mine: int) -> list[tuple[Steps, int]]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 
 from forestall.deadline import Deadline, TimeUp
 from forestall.domain.looked import searched
@@ -20,7 +21,8 @@ from forestall.planning.refused import denial, is_refused, no_other, unexplained
 from forestall.planning.search import SearchConfig
 from forestall.planning.state import State
 from forestall.planning.validate import as_checked, observed, run, unmet, unsupported
-from forestall.replanning.cheaper import Asked, cheaper
+from forestall.replanning.attempts import Attempts
+from forestall.replanning.cheaper import Asked, cheaper, less_of_time
 from forestall.replanning.hidden import (
     IN_VAIN,
     hiding_places,
@@ -31,39 +33,13 @@ from forestall.replanning.hidden import (
 )
 from forestall.replanning.kept import as_it_is, hand, left_running, rests_of, unspoiled
 from forestall.replanning.searching import as_usual, with_shutting, without
+from forestall.replanning.waiting import first_empty
 from forestall.seams.judging import PlanValidator
 from forestall.types.facts import Literal
 from forestall.types.plan import Plan, Subtask
 from forestall.types.runtime import BoundaryContext
 from forestall.types.task import Goal
-from forestall.types.verdict import Diagnosis, PlanCheck, Replan, ReplanOutcome
-
-
-@dataclass(slots=True)
-class _Attempts:
-    """What the attempts of one replanning may take and try, what they cost and how they failed."""
-
-    start_s: float
-    deadline: Deadline
-    refused: frozenset[Subtask] = frozenset()
-    vain: tuple[Subtask, ...] = ()
-    expanded: int = 0
-    timed_out: bool = False
-    unproven: bool = False
-    notes: tuple[str, ...] = ()
-    rejected: tuple[Plan, PlanCheck] | None = None
-
-    def share(self) -> Deadline:
-        """Half of the time that is left, so that one attempt leaves some to the next."""
-        return self.deadline.within(self.deadline.left() / 2)
-
-    def count(self, planned: Planned) -> Planned:
-        self.expanded += planned.expanded
-        self.timed_out |= planned.outcome is ReplanOutcome.TIMEOUT
-        self.unproven = planned.outcome is not ReplanOutcome.UNSOLVABLE
-        if planned.note:
-            self.notes = (*self.notes, planned.note)
-        return planned
+from forestall.types.verdict import Diagnosis, Replan, ReplanOutcome
 
 
 class PlannerReplanner:
@@ -97,15 +73,13 @@ class PlannerReplanner:
                 another thread, and the answer then comes within milliseconds.
         """
         limit = (deadline or Deadline()).within(self.config.time_limit_s)
-        attempts = _Attempts(time.perf_counter(), limit)
+        attempts = Attempts(time.perf_counter(), limit)
         try:
             return self._replan(attempts, context, diagnosis)
         except TimeUp as late:
             return self._ended(attempts, ReplanOutcome.TIMEOUT, str(late))
 
-    def _replan(
-        self, attempts: _Attempts, context: BoundaryContext, diagnosis: Diagnosis
-    ) -> Replan:
+    def _replan(self, attempts: Attempts, context: BoundaryContext, diagnosis: Diagnosis) -> Replan:
         if not diagnosis.must_change:
             return self._ended(attempts, ReplanOutcome.NOTHING_TO_CHANGE, diagnosis.cause)
         lost = sought(diagnosis.must_change, context.graph)
@@ -121,7 +95,7 @@ class PlannerReplanner:
 
     def _changed(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         context: BoundaryContext,
         diagnosis: Diagnosis,
         lost: tuple[str, ...],
@@ -142,7 +116,9 @@ class PlannerReplanner:
             for rest in rests:
                 accepted = self._checked(attempts, context, state, (*repair.subtasks, *rest))
                 if accepted is not None:
-                    return self._shortened(attempts, context, state, accepted, len(rest), wanted)
+                    now = self._shortened(attempts, context, state, accepted, len(rest), wanted)
+                    later = self._later(attempts, context, diagnosis, state, wanted, stay)
+                    return less_of_time(now, later, state, _stands_at(context))
             repairs.append(repair)
         for repair in (*repairs[:1], Planned(ReplanOutcome.SOLVED, (), state)):
             if repair.final is None or not context.task.goal.literals:
@@ -163,9 +139,33 @@ class PlannerReplanner:
                     return self._shortened(attempts, context, state, accepted, 0, wanted)
         return self._failed(attempts, state, wanted)
 
+    def _later(
+        self,
+        attempts: Attempts,
+        context: BoundaryContext,
+        diagnosis: Diagnosis,
+        state: State,
+        wanted: list[Literal],
+        stay: Sequence[Literal],
+    ) -> Replan | None:
+        """The repair once the hands are empty, where that is soon enough and nothing is refused."""
+        rest = context.remaining()
+        waits = None if context.refused else first_empty(state, rest, diagnosis)
+        if waits is None:
+            return None
+        done, then = waits
+        with suppress(TimeUp):  # the plan that mends it now will do
+            for repair in self._repairs(attempts, then, context, wanted, stay):
+                steps = (*rest[:done], *repair.subtasks, *rest[done:])
+                accepted = self._checked(attempts, context, state, steps)
+                if accepted is not None:
+                    left = len(rest) - done
+                    return self._shortened(attempts, context, state, accepted, left, wanted)
+        return None
+
     def _search(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         context: BoundaryContext,
         lost: tuple[str, ...],
         known: Sequence[Literal],
@@ -208,7 +208,7 @@ class PlannerReplanner:
 
     def _look_into(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         context: BoundaryContext,
         state: State,
         place: str,
@@ -234,7 +234,7 @@ class PlannerReplanner:
 
     def _repairs(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         state: State,
         context: BoundaryContext,
         wanted: list[Literal],
@@ -271,7 +271,7 @@ class PlannerReplanner:
 
     def _plan(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         state: State,
         facts: Sequence[Literal],
         widen: bool = False,
@@ -284,7 +284,7 @@ class PlannerReplanner:
         return tidy if tidy.outcome is ReplanOutcome.SOLVED else planned
 
     def _to(
-        self, attempts: _Attempts, state: State, facts: Sequence[Literal], widen: bool = False
+        self, attempts: Attempts, state: State, facts: Sequence[Literal], widen: bool = False
     ) -> Planned:
         share = attempts.share()
         goals = alternatives(state, Goal("", literals=tuple(facts)), deadline=share)
@@ -292,12 +292,12 @@ class PlannerReplanner:
             state, goals, self.config, widen=widen, deadline=share, refused=attempts.refused
         )
 
-    def _can(self, attempts: _Attempts, state: State, literal: Literal) -> bool:
+    def _can(self, attempts: Attempts, state: State, literal: Literal) -> bool:
         return self._to(attempts, state, (literal,)).outcome is ReplanOutcome.SOLVED
 
     def _checked(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         context: BoundaryContext,
         state: State,
         subtasks: Sequence[Subtask],
@@ -323,7 +323,7 @@ class PlannerReplanner:
 
     def _shortened(
         self,
-        attempts: _Attempts,
+        attempts: Attempts,
         context: BoundaryContext,
         state: State,
         found: Replan,
@@ -341,7 +341,7 @@ class PlannerReplanner:
         )
         return cheaper(asked, found, rest)
 
-    def _failed(self, attempts: _Attempts, state: State, wanted: list[Literal]) -> Replan:
+    def _failed(self, attempts: Attempts, state: State, wanted: list[Literal]) -> Replan:
         hands = self.domain.robot.hands
         lost = [a for x in wanted for a in x.args if a not in hands and _is_lost(state, a)]
         if lost:
@@ -359,7 +359,7 @@ class PlannerReplanner:
             return self._ended(attempts, ReplanOutcome.NOT_FOUND, note)
         return self._ended(attempts, ReplanOutcome.UNSOLVABLE, note)
 
-    def _ended(self, attempts: _Attempts, outcome: ReplanOutcome, note: str) -> Replan:
+    def _ended(self, attempts: Attempts, outcome: ReplanOutcome, note: str) -> Replan:
         plan, check = attempts.rejected or (None, None)
         rejected = outcome is ReplanOutcome.REJECTED
         return Replan(
