@@ -435,7 +435,9 @@ def test_a_burner_that_nothing_needs_stays_off_after_the_detour() -> None:
     assert "toggle_on(StoveBurner-2)" not in texts
 
 
-def mended(step: str | None, refused: tuple[Subtask, ...] = ()) -> list[str]:
+def mended(
+    step: str | None, refused: tuple[Subtask, ...] = (), besides: str | None = None
+) -> list[str]:
     """What is done, knife in hand, about a bowl before the slices, which a step minds."""
     current = PLANS["make-salad"]
     index = current.texts().index("slice_obj(Potato)")
@@ -443,6 +445,7 @@ def mended(step: str | None, refused: tuple[Subtask, ...] = ()) -> list[str]:
         home_of("make-salad"),
         "Knife-1 held, LettuceSliced-1 on CounterTop-1, Bowl-1 on CounterTop-1",
         "Potato-1 on CounterTop-1, Tomato-1 on CounterTop-1, Bowl-1 blocks LettuceSliced-1",
+        "Bowl-1 is dirty" if besides else "",
     )
     graph = replace(
         graph,
@@ -451,7 +454,7 @@ def mended(step: str | None, refused: tuple[Subtask, ...] = ()) -> list[str]:
     )
     diagnosis = Diagnosis(
         "the bowl stands in front of the lettuce",
-        (Literal.parse("unblocked(LettuceSliced-1)"),),
+        tuple(map(Literal.parse, filter(None, ("unblocked(LettuceSliced-1)", besides)))),
         step=None if step is None else Subtask.parse(step),
         refusal="" if step is None else "Bowl-1 stands in front of LettuceSliced-1",
     )
@@ -480,4 +483,9 @@ def test_what_the_step_at_hand_minds_is_mended_at_once() -> None:
 
 def test_nothing_waits_once_the_robot_has_refused_something() -> None:
     done = mended("pick_up(LettuceSliced)", (Subtask("put_on", ("Bowl-1", "StoveBurner-1")),))
+    assert "put_on knife" in done[: done.index("slice_obj")]
+
+
+def test_nothing_waits_that_another_step_may_be_in_need_of() -> None:
+    done = mended("pick_up(LettuceSliced)", besides="dirty(Bowl-1)=clean")
     assert "put_on knife" in done[: done.index("slice_obj")]

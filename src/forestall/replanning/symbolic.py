@@ -150,7 +150,8 @@ class PlannerReplanner:
     ) -> Replan | None:
         """The repair once the hands are empty, where that is soon enough and nothing is refused."""
         rest = context.remaining()
-        waits = None if context.refused else first_empty(state, rest, diagnosis)
+        due = None if context.refused else diagnosis.step
+        waits = first_empty(state, rest, due, diagnosis.must_change)
         if waits is None:
             return None
         done, then = waits

@@ -7,30 +7,32 @@ first step that would not work, the steps until then are done first, and both ar
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from forestall.planning.state import State
 from forestall.planning.validate import run
+from forestall.types.facts import Literal
 from forestall.types.plan import Subtask
-from forestall.types.verdict import Diagnosis
 
 
 def first_empty(
-    state: State, rest: Sequence[Subtask], diagnosis: Diagnosis
+    state: State, rest: Sequence[Subtask], due: Subtask | None, wanted: Collection[Literal]
 ) -> tuple[int, State] | None:
     """How many steps are done before the hands are empty, and the state then; None: nothing waits.
 
     Args:
         state: now.
         rest: what is left of the plan.
-        diagnosis: says which step would be refused; where it names none, nothing waits.
+        due: its step that would be refused, where somebody says so.
+        wanted: what must change. If that is more than this step lacks, it may be for a step before.
     """
-    due = diagnosis.step
-    if due is None or not diagnosis.refusal or due not in rest or _empty(state):
+    if due is None or due not in rest or _empty(state):
         return None
-    before = rest[: rest.index(due)]
-    states = run(state, before).states
-    return next(((k, s) for k, s in enumerate(states) if _empty(s)), None)
+    last = rest.index(due)
+    trace = run(state, rest[: last + 1])
+    if trace.refusal is None or trace.step != last or not set(wanted) <= set(trace.refusal.lacking):
+        return None
+    return next(((k, s) for k, s in enumerate(trace.states) if _empty(s)), None)
 
 
 def _empty(state: State) -> bool:
