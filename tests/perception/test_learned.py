@@ -129,3 +129,17 @@ def test_a_reading_refuses_what_cannot_be_divided_by() -> None:
         StateReading(scale=0.0)
     with pytest.raises(InputError, match="above 0"):
         StateReading(temperature={"open": 0.0})
+
+
+@pytest.mark.parametrize(("temperature", "sure"), [({"": 1.0}, 0.99), ({}, 0.9)])
+def test_what_nobody_has_calibrated_is_just_sure_enough(
+    temperature: dict[str, float], sure: float
+) -> None:
+    reading = StateReading(10.0, temperature, {"": 0.9}, least_area=30)
+    estimator = LearnedStateEstimator(ColourEncoder(reading), shipped("household"))
+    frame, mask = look((200, 0, 0))
+    [(states, told)] = estimator.estimate_with_confidence(
+        frame, [Detection("Fridge", mask, "Fridge-1")]
+    )
+    assert states == {"open": "open"}
+    assert told["open"] == pytest.approx(sure, abs=0.01)

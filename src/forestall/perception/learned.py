@@ -34,7 +34,10 @@ class Question:
 
 
 class LearnedStateEstimator:
-    """Argmax over phrases with a calibrated confidence (implements `StateEstimator`).
+    """Argmax over phrases with a confidence (implements `ConfidentStateEstimator`).
+
+    What an encoder says that nobody has calibrated counts as just sure enough to be told, so that
+    it does not outweigh what was read before or what a skill should have made of it.
 
     Args:
         encoder: embeds crops and phrases, and says how its cosines are to be read.
@@ -114,13 +117,13 @@ class LearnedStateEstimator:
     ) -> tuple[Mapping[str, str | None], Mapping[str, float]]:
         found: dict[str, str | None] = {}
         sure: dict[str, float] = {}
+        reading = self._encoder.reading
         for question in questions:
             confidence = self.probabilities(question, row[None])[0]
             best = int(confidence.argmax())
-            sure[question.attribute] = float(confidence[best])
-            enough = self._encoder.reading.least_confidence(question.attribute)
-            told = sure[question.attribute] >= enough
-            found[question.attribute] = question.values[best] if told else None
+            score, enough = float(confidence[best]), reading.least_confidence(question.attribute)
+            found[question.attribute] = question.values[best] if score >= enough else None
+            sure[question.attribute] = score if reading.calibrated else min(score, enough)
         return unobscured(found, self._domain), sure
 
     def _vectors(self, category: str, attribute: str) -> npt.NDArray[np.float32]:

@@ -31,6 +31,11 @@ class StateReading:
         if self.scale <= 0 or any(t <= 0 for t in self.temperature.values()):
             raise InputError("the scale and the temperatures of an encoder are above 0")
 
+    @property
+    def calibrated(self) -> bool:
+        """Whether temperatures were fitted, so that confidences are probabilities."""
+        return bool(self.temperature)
+
     def divisor(self, attribute: str) -> float:
         """The temperature of an attribute."""
         return self.temperature.get(attribute, self.temperature.get("", 1.0))
