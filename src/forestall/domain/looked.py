@@ -73,6 +73,18 @@ def is_there(graph: SceneGraph, name: str) -> bool:
     )
 
 
+def made_of_what_is_there(names: Iterable[str], graph: SceneGraph, domain: Domain) -> set[str]:
+    """Those of some things that a skill makes of something whose place is known."""
+    there = {c for n in graph.nodes if is_there(graph, n.id) for c in domain.becomes(n.category)}
+    return {n for n in names if category_of(domain.canonical(n)) in there}
+
+
+def made_of(names: Iterable[str], graph: SceneGraph, domain: Domain) -> tuple[str, ...]:
+    """Of what skills make those of some things that nobody has seen yet; by name."""
+    unmade = {category_of(domain.canonical(n)) for n in names if not graph.matches(n)}
+    return tuple(sorted(c for c in domain.categories if domain.becomes(c) & unmade))
+
+
 def missing(facts: Iterable[Literal], graph: SceneGraph, domain: Domain) -> tuple[Literal, ...]:
     """What is to be in some state or place and is nowhere to be seen, as facts that it is located.
 

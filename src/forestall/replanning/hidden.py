@@ -40,12 +40,6 @@ def sought(wanted: Sequence[Literal], graph: SceneGraph) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n for n in names if not is_there(graph, n)))
 
 
-def made_of_what_is_there(names: Sequence[str], graph: SceneGraph, domain: Domain) -> set[str]:
-    """Those of some things that a skill makes of something whose place is known."""
-    there = {c for n in graph.nodes if is_there(graph, n.id) for c in domain.becomes(n.category)}
-    return {n for n in names if category_of(domain.canonical(n)) in there}
-
-
 def hiding_places(
     thing: str,
     graph: SceneGraph,

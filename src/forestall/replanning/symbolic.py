@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from forestall.deadline import Deadline, TimeUp
-from forestall.domain.looked import searched
+from forestall.domain.looked import made_of, made_of_what_is_there, searched
 from forestall.domain.model import Domain
 from forestall.planning.goals import alternatives
 from forestall.planning.planner import Planned, plan_goal, plan_to
@@ -28,7 +28,6 @@ from forestall.replanning.hidden import (
     hiding_places,
     in_vain,
     is_shut_place,
-    made_of_what_is_there,
     sought,
 )
 from forestall.replanning.kept import as_it_is, hand, left_running, rests_of, unspoiled
@@ -178,7 +177,8 @@ class PlannerReplanner:
         """
         state = observed(context.graph, self.domain)
         attempts.refused, attempts.vain = unexplained(state, context.refused), context.vain
-        for name in lost:
+        origins = made_of(lost, context.graph, self.domain)
+        for name in (*origins, *lost):
             empty = searched(name, known, self.domain)
             places = hiding_places(
                 name,
@@ -204,7 +204,7 @@ class PlannerReplanner:
                 rest = with_shutting(rest, opening, closing, name, self.domain)
                 plan = Plan((*opening, *rest), found.plan.goal)
                 note = f"looking for {name} in {place}"
-                return replace(found, plan=plan, note=note, looking_for=lost)
+                return replace(found, plan=plan, note=note, looking_for=(*lost, *origins))
         return None
 
     def _look_into(

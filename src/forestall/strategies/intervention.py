@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.brought import came_about
 from forestall.domain.facing import way_here
-from forestall.domain.looked import looked_into, looked_over, missing, not_there
+from forestall.domain.looked import missing
 from forestall.domain.model import LOCATED, Domain
 from forestall.domain.undo import irreversible_skills
 from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
-from forestall.types.episode import SkillStatus
+from forestall.strategies.looking import Looking
 from forestall.types.facts import Literal, Truth
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
@@ -73,9 +73,7 @@ class Intervention:
         self._max_attempts = max_attempts
         self._resume_left = 0
         self._attempts: dict[tuple[Literal, ...] | Subtask, int] = {}
-        self._sought: frozenset[str] = frozenset()
-        self._looked: frozenset[str] = frozenset()
-        self._over: frozenset[str] = frozenset()
+        self._looking = Looking(validator.domain)
 
     def begin(self, context: BoundaryContext) -> None:
         """To be called before every subtask: forgets the last episode when a new one begins."""
@@ -83,13 +81,8 @@ class Intervention:
             self._resume_left = len(context.plan)
             if context.index == 0:
                 self._attempts.clear()
-                self._sought = self._looked = self._over = frozenset()
-        domain = self._validator.domain
-        self._looked |= looked_into(context.graph, domain)
-        here: frozenset[str] = frozenset()
-        if context.executed and context.executed[-1][1] is SkillStatus.SUCCEEDED:
-            here = looked_over(context.graph, context.executed[-1][0], domain)
-        self._over = self._over | here if self._sought else here
+                self._looking.reset()
+        self._looking.begin(context)
 
     def repairs(self, context: BoundaryContext) -> bool:
         """Whether the subtask belongs to a repair, for which there is no demonstration."""
@@ -137,15 +130,13 @@ class Intervention:
     def check_plan(self, context: BoundaryContext, clock: Clock) -> PlanCheck:
         """Does what is left of the plan run from what is seen?
 
-        While something is looked for, a later step that lacks nothing but its place is no fault.
+        While something is looked for, it is no fault that nobody knows where it is.
         """
         rest = rest_of(context, self._validator.domain)
         check = self._validator.check(rest, context.graph, context.task.goal)
         clock.lap("validate")
         now = len(rest) - len(context.remaining())
-        looking = {Literal(LOCATED, (name,)) for name in self._sought}
-        later = check.step is not None and check.step > now
-        if not check.ok and later and check.lacking and looking.issuperset(check.lacking):
+        if not check.ok and self._looking.excuses(check, now, self.repairs(context)):
             return replace(check, ok=True)
         return check
 
@@ -209,6 +200,9 @@ class Intervention:
         clock: Clock,
     ) -> StrategyAnswer:
         """Replan for what must change; `context.index` is where the plan at hand would go on."""
+        if diagnosis.refusal and not diagnosis.found:  # no fact would help: something else is done
+            aim = self._validator.check(Plan(()), context.graph, context.task.goal)
+            diagnosis = replace(diagnosis, must_change=aim.unmet)
         if not diagnosis.found:
             replan = Replan(ReplanOutcome.NOTHING_TO_CHANGE, producer=self._replanner.name)
             why = f"no cause was found: {diagnosis.cause}"
@@ -220,7 +214,7 @@ class Intervention:
         if not context.task.goal.literals and self._brought_about(context):
             why = f"what {context.subtask} is to bring about holds already"
             return StrategyAnswer(Decision.PROCEED, verdict, diagnosis, None, why, clock.items())
-        replan = self._another_way(context, self._with_places(diagnosis))
+        replan = self._another_way(context, self._looking.with_places(diagnosis, context))
         if replan.outcome is not ReplanOutcome.SOLVED:
             replan = self._found_first(context, diagnosis, replan)
         clock.lap("replan")
@@ -228,7 +222,7 @@ class Intervention:
             return self._no_plan(context, verdict, diagnosis, replan, clock)
         if replan.outcome is ReplanOutcome.SOLVED and replan.plan is not None:
             if replan.looking_for:  # another place each time, and there are only so many
-                self._sought |= frozenset(replan.looking_for)
+                self._looking.seek(replan.looking_for)
             else:
                 self._attempts[key] = self._attempts.get(key, 0) + 1
             self._resume_left = min(self._resume_left, _common_suffix(replan.plan, context))
@@ -260,20 +254,12 @@ class Intervention:
         lacking = () if failed.check is None else failed.check.lacking
         nowhere = missing(diagnosis.must_change, context.graph, self._validator.domain)
         named = (*(x for x in lacking if x.predicate == LOCATED), *nowhere)
-        lost = tuple(x for x in dict.fromkeys(named) if x.args[0] not in self._sought)
+        lost = tuple(x for x in dict.fromkeys(named) if x.args[0] not in self._looking.sought)
         if not lost or set(lost) <= set(diagnosis.must_change):
             return failed
-        wanted = self._with_places(replace(diagnosis, must_change=lost))
+        wanted = self._looking.with_places(replace(diagnosis, must_change=lost), context)
         search = self._another_way(context, wanted)
         return search if search.looking_for else failed
-
-    def _with_places(self, diagnosis: Diagnosis) -> Diagnosis:
-        """A diagnosis with where the things that nobody sees are not: where one has looked."""
-        lost = [x.args[0] for x in diagnosis.must_change if x.predicate == LOCATED]
-        domain = self._validator.domain
-        empty = [f for name in lost for f in not_there(name, self._looked | self._over, domain)]
-        must_stay = tuple(dict.fromkeys((*diagnosis.must_stay, *empty)))
-        return replace(diagnosis, must_stay=must_stay) if empty else diagnosis
 
     def _brought_about(self, context: BoundaryContext) -> bool:
         """Whether everything holds already that the subtask does whatever else is so."""
