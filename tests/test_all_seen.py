@@ -17,7 +17,7 @@ from forestall.domain.load import shipped
 from forestall.domain.truth import is_shut
 from forestall.statistics.cases import SPLITS, room
 from forestall.tasks.files import load_scenario
-from forestall.types.episode import EpisodeRecord
+from forestall.types.episode import EpisodeRecord, Outcome
 from forestall.types.facts import Truth
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Observation
@@ -121,3 +121,16 @@ def test_what_is_yet_to_be_made_is_looked_for_as_what_it_is_made_of(
     record = run(scenario, place)
     assert record.success, record.failures
     assert did(record, "crack_obj")
+
+
+@pytest.mark.parametrize("task", ["make-coffee", "make-salad", "boil-water"])
+def test_of_two_of_a_kind_the_rest_of_the_plan_means_the_one_that_was_taken(task: str) -> None:
+    """Before, the rest was checked with the lowest number, and the mug in the hand was empty."""
+    thing = {"make-salad": "bowl", "boil-water": "pot"}.get(task, "mug")
+    record = run(f"harmless-{task}-second-{thing}", 7)
+    assert record.success, record.failures
+    skills = [step.skill for step in record.initial_plan]
+    early = [
+        b for b in record.boundaries if b.outcome is Outcome.REPLAN and b.index < len(skills) - 3
+    ]
+    assert not early, early[0].why

@@ -235,9 +235,7 @@ class RunState:
         self.close_boundary()
         self.fruitless, self.acted = self._counted(), None
         subtask = self.last.subtask
-        for name in subtask.args:
-            if is_instance(name):
-                self.bound[category_of(name)] = name
+        self.bound |= _instances(subtask)
         if outcome.status is SkillStatus.REFUSED:
             self.bound.clear()
             known = around(self.last.graph, subtask, self.domain)
@@ -294,6 +292,7 @@ class RunState:
             refused=tuple(self.refused()),
             vain=self.vain(),
             executed=tuple((e.subtask, e.outcome.status) for e in self.executed),
+            meant={**self.bound, **_instances(subtask)},
         )
 
     @contextmanager
@@ -312,3 +311,8 @@ class RunState:
     def mark(self) -> None:
         """What is booked from here on belongs to the next boundary."""
         self.since = dict(self.seconds)
+
+
+def _instances(subtask: Subtask) -> dict[str, str]:
+    """What the categories of its arguments mean."""
+    return {category_of(name): name for name in subtask.args if is_instance(name)}

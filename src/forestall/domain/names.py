@@ -8,7 +8,7 @@ would that opens a fridge to look for "the egg".
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from forestall.domain.formula import literals
 from forestall.domain.model import Domain
@@ -63,6 +63,35 @@ def ground_subtask(
     if meant not in refused:
         return meant
     return _otherwise(subtask, meant, graph, domain, robot_world_m, refused) or meant
+
+
+def as_meant(
+    steps: Iterable[Subtask], meant: Mapping[str, str], graph: SceneGraph, domain: Domain
+) -> tuple[Subtask, ...]:
+    """Steps of a plan as they will be grounded, as far as that is known before they come up.
+
+    Of several things of a category the one that is in the hand is meant, or that the category has
+    meant before; on an open support it is the robot's controller that chooses.
+
+    Args:
+        steps: with categories or instances.
+        meant: category → instance, from earlier subtasks of the same episode.
+        graph: the whole fused graph.
+        domain: what names mean.
+    """
+    held = {n.category: n.id for h in graph.in_hands(domain.robot.hands) if (n := graph.get(h))}
+    known = {
+        category: name
+        for category, name in {**meant, **held}.items()
+        if len(graph.of_category(category)) > 1
+        and graph.get(name) is not None
+        and not domain.is_open_support(category)
+    }
+    if not known:
+        return tuple(steps)
+    return tuple(
+        Subtask(s.skill, tuple(known.get(domain.canonical(a), a) for a in s.args)) for s in steps
+    )
 
 
 def _otherwise(

@@ -108,7 +108,7 @@ def rests_of(
     """What is left of the current plan, with the drive that led to its first step.
 
     First with categories of which there are several bound to the thing that the robot deals with
-    now, then as it stands.
+    now, or has dealt with, then as it stands.
     """
     rest = context.plan.subtasks[context.index :]
     before = context.plan.subtasks[context.index - 1 : context.index] if context.index else ()
@@ -116,7 +116,8 @@ def rests_of(
     if repaired and before and driving is not None and before[0].skill == driving.name:
         rest = (*before, *rest)
     bound = {}
-    for name in (*context.subtask.args, *(h for _, h in state.in_hands())):
+    held = (h for _, h in state.in_hands())
+    for name in (*context.meant.values(), *context.subtask.args, *held):
         kind = state.kinds.get(name)
         if kind is None or state.domain.is_a(kind, state.domain.roles.fixture):
             continue

@@ -14,6 +14,7 @@ from forestall.domain.brought import came_about
 from forestall.domain.facing import way_here
 from forestall.domain.looked import missing
 from forestall.domain.model import LOCATED, Domain
+from forestall.domain.names import as_meant
 from forestall.domain.undo import irreversible_skills
 from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
@@ -368,10 +369,11 @@ def relied_on_now(
 
 
 def rest_of(context: BoundaryContext, domain: Domain) -> Plan:
-    """What is left of the plan, with the drive before it: where the robot stands matters."""
+    """What is left of the plan, with the drive before it and its things as they will be meant."""
     steps, index = context.plan.subtasks, context.index
     before = way_here(steps, index, context.graph, domain)
-    return Plan((*before, *steps[index:]), context.plan.goal)
+    rest = as_meant((*before, *steps[index:]), context.meant, context.graph, domain)
+    return Plan(rest, context.plan.goal)
 
 
 def _common_suffix(plan: Plan, context: BoundaryContext) -> int:

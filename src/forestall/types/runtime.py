@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -59,6 +60,7 @@ class BoundaryContext:
             as far as anybody sees, their effects did not come about. Another way is better.
         executed: what was tried so far, and how each subtask ended.
         said: what every judge said of this scene, where several are heard.
+        meant: category → the instance that it has meant in this run, the subtask's own among them.
     """
 
     task: Task
@@ -79,6 +81,7 @@ class BoundaryContext:
     vain: tuple[Subtask, ...] = ()
     executed: tuple[tuple[Subtask, SkillStatus], ...] = ()
     said: tuple[Verdict, ...] = ()
+    meant: Mapping[str, str] = field(default_factory=dict)
 
     def remaining(self) -> tuple[Subtask, ...]:
         """What is left of the plan, this subtask first (not grounded)."""
