@@ -17,7 +17,8 @@ from forestall.domain.load import shipped
 from forestall.domain.truth import is_shut
 from forestall.statistics.cases import SPLITS, room
 from forestall.tasks.files import load_scenario
-from forestall.types.episode import EpisodeRecord, Outcome
+from forestall.types.decision import Outcome
+from forestall.types.episode import EpisodeRecord
 from forestall.types.facts import Truth
 from forestall.types.graph import SceneGraph, Seen
 from forestall.types.observation import Observation

@@ -94,10 +94,23 @@ def conclude(
             return replace(decision, outcome=Outcome.LOOK, may_start=False, why=why)
         return replace(decision, outcome=Outcome.NOT_JUDGED, may_start=may, why=why)
     verdict = answer.verdict
-    alarm = verdict is not None and verdict.decision is Decision.REPLAN
-    if alarm and config.on_alarm == "hold":
+    if verdict is not None and verdict.decision is Decision.STOP:
+        return _held(decision, Hold.STOPPED, answer.why or verdict.note)
+    if _alarmed(answer) and config.on_alarm == "hold":
         return _held(decision, Hold.ALARM, answer.why or "nothing came of an alarm")
     return decision
+
+
+def _alarmed(answer: StrategyAnswer) -> bool:
+    """Whether somebody speaks against going on: the strategy, or a judge that it only watches."""
+    verdict = answer.verdict
+    if answer.decision is Decision.REPLAN:  # and it has no plan
+        return True
+    if verdict is not None and verdict.decision is Decision.REPLAN:
+        return True
+    return answer.only_watched and any(
+        v.judged and v.decision is not Decision.PROCEED for v in answer.watched
+    )
 
 
 def _held(decision: MonitorDecision, hold: Hold, why: str) -> MonitorDecision:
@@ -111,6 +124,7 @@ def _not_judged(context: BoundaryContext, answer: StrategyAnswer, strategy: str)
     located. An alarm was judged, whatever else was not seen.
     """
     verdict, again = answer.verdict, answer.decision is Decision.LOOK_AGAIN
+    again |= verdict is not None and verdict.decision is Decision.LOOK_AGAIN
     if verdict is not None and verdict.decision is Decision.REPLAN and not again:
         return ""
     unseen = unlocated(context)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from forestall.errors import ObservationError
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
@@ -27,10 +29,13 @@ class Senses:
     _graph: SceneGraph | None = None
     _done: int = 0
     _effects: int = 0
+    _last: Observation | None = None
+    _since: int = 0
 
     def done(self, has_effect: bool) -> None:
         """The robot reports a subtask as done; by the rules it changes something or not."""
         self._done += 1
+        self._since += 1
         self._effects += has_effect
 
     def check(self, observation: Observation | SceneGraph) -> None:
@@ -48,6 +53,12 @@ class Senses:
                 observation.graph is None or not observation.graph.nodes
             ):
                 raise ObservationError("nothing at all is seen: neither a picture nor a thing")
+            if self._since and self._last is not None and _the_same(self._last, observation):
+                raise ObservationError(
+                    "this is the very observation from before a subtask that was reported as done: "
+                    "look anew after each"
+                )
+            self._last, self._since = observation, 0
             graph = observation.graph
         if graph is None:
             return
@@ -64,6 +75,17 @@ class Senses:
         if self._time_s is not None and not time_s >= self._time_s:
             raise ObservationError(f"time runs back: {time_s:g} s after {self._time_s:g} s")
         self._time_s = time_s
+
+
+def _the_same(one: Observation, other: Observation) -> bool:
+    """Whether both are one look: of one time, with the same pictures to the last bit."""
+    if one.time_s != other.time_s or not 0 < len(one.frames) == len(other.frames):
+        return False
+    pairs = list(zip(one.frames, other.frames, strict=True))
+    return all(
+        a is b or (np.array_equal(a.rgb, b.rgb) and np.array_equal(a.depth_m, b.depth_m))
+        for a, b in pairs
+    )
 
 
 def _timeless(graph: SceneGraph) -> SceneGraph:

@@ -102,7 +102,9 @@ def rehearse(
     unobserved: dict[Literal, None] = {}
     if all(s.excused for s in spoils):
         unobserved = dict.fromkeys(x for x in check.lacking if x.predicate == LOCATED)
-        for fact in _assumed(plan, check, trace)[:_MOST_TRIED]:
+        assumed = _assumed(plan, check, trace)
+        unobserved |= dict.fromkeys(assumed[_MOST_TRIED:])  # nobody has tried them otherwise
+        for fact in assumed[:_MOST_TRIED]:
             for other in _otherwise(graph, fact, domain):
                 found, _, harm = _tried(plan, other, goal, domain, excuses)
                 if _good(found, harm) is not check.ok:
@@ -129,13 +131,16 @@ def _tried(
 
 
 def _assumed(plan: Plan, check: PlanCheck, trace: Trace) -> list[Literal]:
-    """Assumed facts about what the plan handles, would handle, or the goal asks for."""
+    """Assumed facts about what the plan handles, would handle, or the goal asks for.
+
+    Those first on which the validator's answer rests.
+    """
     states = (trace.states[0], trace.final)
     named = {a for step in plan for a in step.args} | {a for x in check.lacking for a in x.args}
     touched = {m for n in named for m in trace.final.matches(n)} | trace.touched
     touched |= {p.parent for n in tuple(touched) for p in trace.final.chain(n)}
     facts = {f for s in states for f in s.assumed if f.args and f.args[0] in touched}
-    return sorted(facts | set(check.assumed))
+    return sorted(facts | set(check.assumed), key=lambda f: (f not in check.assumed, f))
 
 
 def _otherwise(graph: SceneGraph, fact: Literal, domain: Domain) -> Iterator[SceneGraph]:

@@ -7,6 +7,7 @@ the alarm is raised is the strategy's own affair; what follows from it is the sa
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 from forestall.domain.asked import asked_of, is_asked
@@ -364,7 +365,14 @@ def relied_on_now(
         for x in check.assumed
         if set(x.args) & set(context.subtask.args)
         and known.issuperset(x.args)
-        and is_asked(x, asked)
+        and (is_asked(x, asked) or _emptiness_asked(x, asked, domain))
+    )
+
+
+def _emptiness_asked(fact: Literal, asked: Collection[Literal], domain: Domain) -> bool:
+    """Whether a place is assumed to be empty, and it is asked what is in it."""
+    return fact.predicate == domain.roles.vacant and any(
+        x.predicate in domain.containing and x.args[-1] == fact.args[0] for x in asked
     )
 
 

@@ -57,7 +57,7 @@ class Panel:
     def decide(self, said: Sequence[Verdict]) -> Verdict:
         """The verdict that speaks for all."""
         voices = [v for v in said if v.judged]
-        alarms = [v for v in voices if v.decision is Decision.REPLAN]
+        alarms = [v for v in voices if v.decision in (Decision.REPLAN, Decision.STOP)]
         unsure = [v for v in voices if v.decision is Decision.LOOK_AGAIN]
         fine = [v for v in voices if v.decision is Decision.PROCEED]
         if self._agree is Agree.ALL and fine:

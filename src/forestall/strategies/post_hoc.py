@@ -104,8 +104,10 @@ class PostHoc:
         clock.lap("compare")
         if verdict.decision is not Decision.PROCEED:
             self._summary.unlike.append((replace(context, references=references), verdict))
-        verdict = replace(verdict, decision=Decision.PROCEED)
-        return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
+        kept = replace(verdict, decision=Decision.PROCEED)
+        return StrategyAnswer(
+            Decision.PROCEED, kept, seconds=clock.items(), watched=(verdict,), only_watched=True
+        )
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
         """Keep whether the robot could do it, go on."""
