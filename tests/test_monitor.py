@@ -282,6 +282,23 @@ def test_an_alarm_that_nothing_comes_of_is_for_the_caller_to_pass(
     assert decision.why == "nothing must change"
 
 
+@pytest.mark.parametrize(
+    "answer",
+    [
+        StrategyAnswer(Decision.REPLAN, FITS),
+        StrategyAnswer(Decision.REPLAN, FITS, None, Replan(ReplanOutcome.TIMEOUT)),
+        StrategyAnswer(Decision.PROCEED, replace(FITS, decision=Decision.LOOK_AGAIN)),
+        StrategyAnswer(Decision.PROCEED, replace(FITS, decision=Decision.STOP)),
+        StrategyAnswer(Decision.PROCEED, FITS, watched=(FITS, ALARM), only_watched=True),
+    ],
+)
+def test_an_answer_that_contradicts_itself_lets_nothing_start(answer: StrategyAnswer) -> None:
+    monitor, _ = started(answer)
+    decision = monitor.before(scene())
+    assert decision.outcome is not Outcome.PROCEED
+    assert not decision.may_start
+
+
 def test_as_many_subtasks_as_may_be() -> None:
     monitor, strategy = started(max_subtasks=1)
     monitor.before(scene())

@@ -54,6 +54,18 @@ def test_wrong_plans_fail_unless_they_are_about_what_nobody_saw(case: Wrong) -> 
         assert (found.outcome, found.unobserved) == (PlanOutcome.FAILS, ())
 
 
+def test_what_was_assumed_and_not_tried_otherwise_leaves_the_answer_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    home = unobserved(scene(home_of("heat-potato")), "Potato-1", "temperature")
+    goal = Goal("")
+    assert rehearse(plan("navigate_to_obj(Potato)"), home, goal, DOMAIN).outcome is PlanOutcome.RUNS
+    monkeypatch.setattr("forestall.planning.rehearse._MOST_TRIED", 0)
+    found = rehearse(plan("navigate_to_obj(Potato)"), home, goal, DOMAIN)
+    assert found.outcome is PlanOutcome.OPEN
+    assert Literal.parse("temperature(Potato-1)=room") in found.unobserved
+
+
 def test_what_the_goal_forbids_is_named_with_its_step() -> None:
     case = next(c for c in WRONG if c.name == "irreversible: coffee into a dirty mug")
     (spoilt,) = rehearse(case.plan, case.scene, case.goal, DOMAIN).spoils

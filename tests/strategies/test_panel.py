@@ -6,12 +6,16 @@ import pytest
 from scripted import HOT, OPEN, Parts, boundary
 
 from forestall.domain.load import shipped
+from forestall.planning.validate import GraphValidator
 from forestall.strategies.judges import DetectorJudge
 from forestall.strategies.panel import Agree, Panel, plan_verdict, together
 from forestall.strategies.proactive import Proactive
-from forestall.types.facts import Literal
+from forestall.types.facts import GRIPPER, Literal
 from forestall.types.plan import Plan, Subtask
+from forestall.types.task import Goal
 from forestall.types.verdict import Calibration, Decision, Diagnosis, PlanCheck, Verdict
+from planning.corpus import DOMAIN, home_of, scene
+from planning.episodes import OBSERVATION
 
 GO, LOOK, ALARM = Decision.PROCEED, Decision.LOOK_AGAIN, Decision.REPLAN
 STEP = Subtask.parse("put_in(Plate-1, Microwave-1)")
@@ -28,6 +32,7 @@ def verdict(decision: Decision, detector: str = "a", judged: bool = True) -> Ver
     [
         (Agree.ANY, (GO, ALARM), ALARM), (Agree.ANY, (GO, GO), GO),
         (Agree.ANY, (GO, LOOK), LOOK), (Agree.ANY, (ALARM, LOOK), LOOK),
+        (Agree.ANY, (GO, Decision.STOP), Decision.STOP), (Agree.ALL, (GO, Decision.STOP), GO),
         (Agree.ALL, (GO, ALARM), GO), (Agree.ALL, (ALARM, ALARM), ALARM),
         (Agree.ALL, (GO, LOOK), GO), (Agree.ALL, (ALARM, LOOK), LOOK),
     ],
@@ -104,3 +109,24 @@ def test_what_the_robot_refused_is_replanned_with_what_the_judges_lack() -> None
     assert answer.diagnosis is not None and answer.diagnosis.producer == "skill status"
     assert answer.diagnosis.must_change == (HOT,)
     assert [v.detector for v in answer.watched] == ["plan check"]
+
+
+def test_a_place_that_nobody_saw_into_is_no_empty_one() -> None:
+    graph = scene(home_of("heat-potato"), "Plate-1 held, Microwave-1 is open, Microwave-1 hidden")
+    step = Subtask.parse("put_in(Plate-1, Microwave-1)")
+    context = replace(boundary(), graph=graph, subtask=step)
+    check = GraphValidator(DOMAIN).check(Plan((step,)), graph, Goal(""))
+    assert check.ok, "it is assumed to be empty"
+    verdict = plan_verdict(context, check, DOMAIN)
+    assert (verdict.decision, verdict.note) == (LOOK, "not observed: vacant(Microwave-1)")
+
+
+def test_a_hand_that_tells_nothing_is_no_empty_one() -> None:
+    graph = scene(home_of("heat-potato"))
+    without = replace(graph, nodes=tuple(n for n in graph.nodes if n.id != GRIPPER))
+    mute = replace(OBSERVATION, gripper=replace(OBSERVATION.gripper, told=False))
+    step = Subtask.parse("pick_up(Plate-1)")
+    for known, seen, decision in ((graph, OBSERVATION, GO), (without, mute, LOOK)):
+        context = replace(boundary(), graph=known, observation=seen, subtask=step)
+        check = GraphValidator(DOMAIN).check(Plan((step,)), known, Goal(""))
+        assert plan_verdict(context, check, DOMAIN).decision is decision

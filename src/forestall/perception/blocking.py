@@ -108,13 +108,17 @@ def _axes(direction: npt.NDArray[np.float64]) -> Axes:
 def _open_edge(stack: Stack, support: int, eye_world_m: Points, config: PerceptionConfig) -> Axes:
     """Over which edge of a support a hand comes.
 
-    Over a longer side, the one towards the robot; over the side that faces the robot most where
-    the sides are alike.
+    Over the side before which the robot stands, if it stands before one of them, whatever part of
+    the support shows. Else, at a corner or over it, over a longer side, the one towards the robot;
+    over the side that faces the robot most where the sides are alike.
     """
-    size = stack.high_m[support, :2] - stack.low_m[support, :2]
-    towards = eye_world_m[:2] - (stack.high_m[support, :2] + stack.low_m[support, :2]) / 2
+    low, high = stack.low_m[support, :2], stack.high_m[support, :2]
+    size, towards = high - low, eye_world_m[:2] - (high + low) / 2
+    before = (low > eye_world_m[:2]) | (eye_world_m[:2] > high)
     along = int(np.argmin(size))
-    if size.max() < config.oblong * size.min():
+    if before.sum() == 1:
+        along = int(np.argmax(before))
+    elif size.max() < config.oblong * size.min():
         along = int(np.argmax(np.abs(towards)))
     direction = np.zeros(2)
     direction[along] = 1.0 if towards[along] >= 0 else -1.0

@@ -24,6 +24,10 @@ class PerceptionConfig:
         fixture_voxel_m: the same for furniture, which is large.
         min_cell_support: pixels in a 4-voxel cell and its six neighbours below which the cell is
             an outlier (flying pixels at depth edges).
+        sparse_share: share of the pixels that a surface facing the camera would show there under
+            which such a cell of a movable thing is one, too.
+        dense_share: share of a thing's pixels that must be left by that, else it is a sliver and
+            keeps them.
         rim_px: how far a mask may bleed over its thing's outline (masks drawn by hand: 2 to 4).
         core_share: share of a mask that must be left as its core, else the rim is thinner.
         steep: depth per width of a pixel above which neighbours lie on two surfaces (80 degrees).
@@ -57,6 +61,7 @@ class PerceptionConfig:
         on_dish_share: the same for a dish of which plenty of contacts show; what lies on it hides
             its far half.
         plenty_contacts: so many support points.
+        on_strange_share: the same for a thing of no known category, where nothing known carries it.
         covered_share: share of a small support that lies under an object (a burner under a pot).
         footprint_slack_m: tolerance of footprints.
         sectors: directions in which walls are looked for around something contained.
@@ -123,6 +128,8 @@ class PerceptionConfig:
     voxel_m: float = 0.008
     fixture_voxel_m: float = 0.02
     min_cell_support: int = 4
+    sparse_share: float = 0.1
+    dense_share: float = 0.5
     rim_px: int = 9
     core_share: float = 0.25
     steep: float = 6.0
@@ -149,6 +156,7 @@ class PerceptionConfig:
     on_top_share: float = 0.7
     on_dish_share: float = 0.4
     plenty_contacts: int = 30
+    on_strange_share: float = 0.6
     covered_share: float = 0.5
     footprint_slack_m: float = 0.01
     sectors: int = 8

@@ -9,7 +9,7 @@ Called by `fuse.py`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def _parent(
         r for r in near if _takes(domain, stack.things[r].category, stack.things[a].category)
     ]
     if not candidates:
-        return None
+        return _on_anything(stack, a, near, _bottom_m(stack, a, domain), domain, config)
     own = stack.samples[a]
     over = stack.over(own, candidates, config.footprint_slack_m)
     share = dict(zip(candidates, over.mean(axis=0).tolist(), strict=True))
@@ -114,9 +114,40 @@ def _parent(
         elif over_it and level:
             touching.append((0.0, predicate, r))
     if not holding and not touching:
-        return None
+        return _on_anything(stack, a, near, bottom, domain, config)
     _, predicate, r = min(holding or touching)
     return predicate, stack.things[r].id
+
+
+def _on_anything(
+    stack: Stack,
+    a: int,
+    near: Sequence[int],
+    bottom_m: float,
+    domain: Domain,
+    config: PerceptionConfig,
+) -> Parent | None:
+    """On which thing of no known category it stands: most of it over it, and its top at its foot.
+
+    Asked where nothing that is known carries it.
+    """
+    low_m = float(stack.low_m[a, 2])
+    strange = [
+        r
+        for r in near
+        if domain.find(stack.things[r].category) is None
+        and stack.things[r].category != SURFACE
+        and bottom_m - config.contact_below_m
+        <= stack.high_m[r, 2]
+        <= low_m + config.contact_above_m
+        and _contacts(stack, a, r, bottom_m, config) >= config.min_contacts
+    ]
+    if not strange:
+        return None
+    over = stack.over(stack.samples[a], strange, config.footprint_slack_m).mean(axis=0)
+    share, r = max(zip(over.tolist(), strange, strict=True))
+    how = offered(domain, stack.things[r].category)
+    return None if how is None or share < config.on_strange_share else (how, stack.things[r].id)
 
 
 def offered(domain: Domain, receptacle: str) -> str | None:

@@ -131,7 +131,8 @@ def clouds(
     index, owner = _sampled_pixels(frame, flat, low_bits)
     points = _to_world(frame, index)
     worth = np.square(low_bits + 1, dtype=np.float64)
-    owner, points, weights = _thin(points, owner, np.asarray(voxel_m), worth, config)
+    facing = _facing_px(frame, points, np.asarray(voxel_m)[owner], config)
+    owner, points, weights = _thin(points, owner, np.asarray(voxel_m), worth, facing, config)
     starts = np.searchsorted(owner, np.arange(count + 1))
     result: list[Cloud | None] = []
     for i in range(count):
@@ -210,11 +211,13 @@ def _thin(
     owner: npt.NDArray[np.int64],
     voxel_m: Points,
     worth: Points,
+    facing_px: Points,
     config: PerceptionConfig,
 ) -> tuple[npt.NDArray[np.int64], Points, Points]:
     """Voxel means, outliers removed: owner, point and pixels of each voxel, by owner.
 
-    `worth` is how many pixels a sampled one of each owner stands for.
+    `worth` is how many pixels a sampled one of each owner stands for, `facing_px` how many a
+    surface that faces the camera would show in a coarse cell at each point.
     """
     cell = np.floor(points / voxel_m[owner][:, None]).astype(np.int64) + _GRID_HALF
     np.clip(cell, 0, 2 * _GRID_HALF - 1, out=cell)
@@ -228,8 +231,25 @@ def _thin(
     means = np.add.reduceat(points[order], starts, axis=0) / weights[:, None]
     first = order[starts]
     weights *= worth[owner[first]]
-    keep = _supported(owner[first], cell[first] >> _COARSE, weights, config.min_cell_support)
-    return owner[first][keep], means[keep], weights[keep]
+    own = owner[first]
+    held = _held(own, cell[first] >> _COARSE, weights)
+    keep = held >= config.min_cell_support
+    dense = keep & (held >= config.sparse_share * facing_px[first])
+    all_px, left_px = (np.bincount(own, weights * f, len(voxel_m)) for f in (keep, dense))
+    keep = np.where((left_px >= config.dense_share * all_px)[own], dense, keep)
+    return own[keep], means[keep], weights[keep]
+
+
+def _facing_px(frame: Frame, points: Points, voxel_m: Points, config: PerceptionConfig) -> Points:
+    """(n,) pixels that a surface facing the camera shows in a coarse cell at each point.
+
+    None for furniture, which is seen at grazing angles.
+    """
+    pose, k = frame.camera_to_world, frame.intrinsics
+    away_m = np.maximum((points - pose[:3, 3]) @ pose[:3, 2], 0.05)
+    facing: Points = np.square(voxel_m * (1 << _COARSE) / away_m) * (k.fx * k.fy)
+    facing[voxel_m >= config.fixture_voxel_m] = 0.0
+    return facing
 
 
 def _key(owner: npt.NDArray[np.int64], cell: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -239,14 +259,12 @@ def _key(owner: npt.NDArray[np.int64], cell: npt.NDArray[np.int64]) -> npt.NDArr
     return key
 
 
-def _supported(
-    owner: npt.NDArray[np.int64], coarse: npt.NDArray[np.int64], weights: Points, least: int
-) -> npt.NDArray[np.bool_]:
-    """Whether a voxel's coarse cell with its six neighbours holds enough pixels."""
+def _held(owner: npt.NDArray[np.int64], coarse: npt.NDArray[np.int64], weights: Points) -> Points:
+    """How many pixels a voxel's coarse cell with its six neighbours holds."""
     key = _key(owner, coarse)
     cells, inverse = np.unique(key, return_inverse=True)
     held = np.bincount(inverse, weights=weights)
-    total = held.copy()
+    total: Points = held.astype(np.float64)
     for step in (1, 1 << _GRID_BITS, 1 << (2 * _GRID_BITS)):
         at = np.searchsorted(cells, cells + step)
         hit = np.flatnonzero(
@@ -254,5 +272,4 @@ def _supported(
         )
         np.add.at(total, hit, held[at[hit]])
         np.add.at(total, at[hit], held[hit])
-    enough: npt.NDArray[np.bool_] = (total >= least)[inverse]
-    return enough
+    return total[inverse]

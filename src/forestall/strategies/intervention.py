@@ -7,10 +7,8 @@ the alarm is raised is the strategy's own affair; what follows from it is the sa
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from forestall.domain.asked import asked_of, is_asked
 from forestall.domain.brought import came_about
 from forestall.domain.facing import way_here
 from forestall.domain.looked import missing
@@ -20,6 +18,7 @@ from forestall.domain.undo import irreversible_skills
 from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.asked import AskedReplanner, AskedValidator
 from forestall.strategies.looking import Looking
+from forestall.strategies.relied import relied_on_now
 from forestall.types.facts import Literal, Truth
 from forestall.types.plan import Plan, Subtask, same_step
 from forestall.types.runtime import BoundaryContext, StrategyAnswer
@@ -348,31 +347,6 @@ def look_again(
     verdict = replace(verdict, decision=Decision.LOOK_AGAIN)
     return StrategyAnswer(
         Decision.LOOK_AGAIN, verdict, why=why, seconds=clock.items(), suspected=suspected
-    )
-
-
-def relied_on_now(
-    check: PlanCheck, context: BoundaryContext, domain: Domain
-) -> tuple[Literal, ...]:
-    """Unobserved facts about the next subtask's arguments that its needs ask about.
-
-    What is assumed of things that nobody has seen is not among them: those are looked for.
-    """
-    graph = context.graph
-    asked, known = asked_of(graph, context.subtask, domain), {n.id for n in graph.nodes}
-    return tuple(
-        x
-        for x in check.assumed
-        if set(x.args) & set(context.subtask.args)
-        and known.issuperset(x.args)
-        and (is_asked(x, asked) or _emptiness_asked(x, asked, domain))
-    )
-
-
-def _emptiness_asked(fact: Literal, asked: Collection[Literal], domain: Domain) -> bool:
-    """Whether a place is assumed to be empty, and it is asked what is in it."""
-    return fact.predicate == domain.roles.vacant and any(
-        x.predicate in domain.containing and x.args[-1] == fact.args[0] for x in asked
     )
 
 

@@ -11,9 +11,10 @@ from dataclasses import replace
 from enum import Enum
 
 from forestall.domain.model import Domain
-from forestall.strategies.intervention import PLAN_CHECK, checked, relied_on_now, would_not_work
+from forestall.strategies.intervention import PLAN_CHECK, checked, would_not_work
 from forestall.strategies.judges import Judge
 from forestall.strategies.plan_check import told
+from forestall.strategies.relied import relied_on_now
 from forestall.types.runtime import BoundaryContext
 from forestall.types.verdict import Decision, Diagnosis, PlanCheck, Verdict
 

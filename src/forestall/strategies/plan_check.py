@@ -16,9 +16,9 @@ from forestall.strategies.intervention import (
     Intervention,
     checked,
     look_again,
-    relied_on_now,
     would_not_work,
 )
+from forestall.strategies.relied import relied_on_now
 from forestall.types.episode import SkillOutcome
 from forestall.types.runtime import BoundaryContext, LooksAfter, StrategyAnswer
 from forestall.types.verdict import Decision, PlanCheck
