@@ -85,6 +85,23 @@ def test_what_was_not_seen_calls_for_another_look() -> None:
     assert verdict.note == "not observed: dirt(RoundHole-1)=clean (held in 4 of 4 demonstrations)"
 
 
+@pytest.mark.parametrize("value", ["yes", None])
+def test_an_argument_with_an_attribute_that_nobody_knows_calls_for_another_look(
+    value: str | None,
+) -> None:
+    plain = scene()
+    nodes = {n.id: n for n in plain.nodes}
+    for name, decision in (
+        ("RoundHole-1", Decision.LOOK_AGAIN),
+        ("Nut-1", Decision.PROCEED),
+    ):
+        more = replace(nodes[name], states=(*nodes[name].states, ("cracked", value)))
+        graph = replace(plain, nodes=tuple({**nodes, name: more}.values()))
+        verdict = PreconditionDetector(BENCH).judge(graph, None, FOUR)
+        assert verdict.decision is decision
+        assert ("the attribute cracked" in verdict.note) is (decision is Decision.LOOK_AGAIN)
+
+
 def test_one_demonstration_raises_an_alarm_that_says_so() -> None:
     verdict = PreconditionDetector(BENCH).judge(scene(IN_THE_HOLE), None, FOUR[:1])
     assert verdict.decision is Decision.REPLAN

@@ -74,8 +74,8 @@ class PreconditionDetector:
     """Judges by mined preconditions (implements `Detector`).
 
     - a precondition is violated whose weight the threshold asks for: replan;
-    - none is, but one could not be observed, or an argument has a relation that the domain does
-      not know: look again, because what was not seen or not known is neither;
+    - none is, but one could not be observed, or an argument has a relation or an attribute that
+      the domain does not know: look again, because what was not seen or not known is neither;
     - all hold: proceed; a note says what other tasks ask and does not hold, where nobody has shown
       such a subtask in the task at hand;
     - nothing was mined: proceed without a score and with a note; nothing was judged.
@@ -187,12 +187,7 @@ class PreconditionDetector:
             note = _listed("violated", false)
             verdict = self._verdict(Decision.REPLAN, score, references, note, facts)
             return replace(verdict, expected_by=max(false, key=weight).precondition.expected_by)
-        look = context is not None and context.may_look
-        unseen = [
-            v
-            for v in found
-            if v.truth is Truth.UNOBSERVED and (look or not v.precondition.expected_by)
-        ]
+        unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
         strange = self._strange(observed, subtask)
         if unseen or strange:
             seen_not = [_listed("not observed", unseen)] if unseen else []
@@ -208,12 +203,20 @@ class PreconditionDetector:
 
     def _strange(self, observed: SceneGraph, subtask: Subtask) -> list[str]:
         """What is said of an argument in words that the domain lacks: it may matter or not."""
-        return [
+        about = {name for a in subtask.args for name in observed.matches(a)}
+        relations = [
             f"{r}: nothing is known of the relation {r.predicate}, so it may matter"
             for r in observed.relations
             if r.predicate not in self._domain.predicates
-            and (r.subject in subtask.args or r.object in subtask.args)
+            and (r.subject in about or r.object in about)
         ]
+        attributes = [
+            f"{n.id}: nothing is known of the attribute {attribute}, so it may matter"
+            for n in observed.nodes
+            for attribute, _ in (n.states if n.id in about else ())
+            if attribute not in self._domain.attributes
+        ]
+        return relations + attributes
 
     def _not_judged(
         self,
