@@ -43,6 +43,9 @@ from forestall.types.verdict import (
 _TOLD = 3
 """How many facts a note names."""
 
+_SILENT = "no alarm, because too many good runs had one, so nothing was judged"
+"""What is told of a violation where a calibration leaves no alarm."""
+
 _KEPT = 256
 """How many sets of mined preconditions are remembered."""
 
@@ -78,14 +81,16 @@ class PreconditionDetector:
       the domain does not know: look again, because what was not seen or not known is neither;
     - all hold: proceed; a note says what other tasks ask and does not hold, where nobody has shown
       such a subtask in the task at hand;
-    - nothing was mined: proceed without a score and with a note; nothing was judged.
+    - nothing was mined: proceed without a score and with a note; nothing was judged;
+    - a calibration leaves no alarm, and a precondition is violated that no person added: the same.
 
     Args:
         domain: what facts there are about arguments.
         mining: how much evidence a precondition needs.
         config: the threshold.
         thresholds: from a calibration, which has counted the alarms of good runs: as a judge that
-            says yes or no it may alarm or it may not, whatever the weight.
+            says yes or no it may alarm or it may not, whatever the weight; what a person added
+            alarms all the same.
         corrections: what a person says of what is mined.
         knowledge: what is known of the whole memory and of the plan; None: only the references of
             a boundary are.
@@ -130,29 +135,29 @@ class PreconditionDetector:
         context: BoundaryContext | None = None,
     ) -> Verdict:
         """See which mined preconditions hold on the scoped graph of a boundary."""
-        verdict = self._judge(observed, references, context)
+        line = None
+        if self._thresholds is not None:
+            line = drawn(self._thresholds, observed.subtask, 1.0)
+        silent = line is not None and line.value <= 0
+        verdict = self._judge(observed, references, context, silent)
         if context is not None:
             verdict = replace(verdict, exchanges=self._expectations.asked(context))
-        if self._thresholds is None or verdict.score is None:
+        alarm = verdict.decision is Decision.REPLAN
+        if line is None or verdict.score is None or (silent and alarm):
             return verdict
-        fits = 0.0 if verdict.decision is Decision.REPLAN else 1.0
-        line = drawn(self._thresholds, observed.subtask, 1.0)
-        verdict = replace(
+        return replace(
             verdict,
             calibration=line.calibration,
             note="; ".join(n for n in (verdict.note, line.note) if n),
-            p_value=rarity(self._thresholds, observed.subtask, fits),
+            p_value=rarity(self._thresholds, observed.subtask, 0.0 if alarm else 1.0),
         )
-        if line.value > 0 or verdict.decision is not Decision.REPLAN:
-            return verdict
-        note = f"no alarm, because too many good runs had one; {verdict.note}"
-        return replace(verdict, decision=Decision.PROCEED, threshold=0.0, note=note, lacking=())
 
     def _judge(
         self,
         observed: SceneGraph,
         references: Sequence[Reference],
         context: BoundaryContext | None,
+        silent: bool,
     ) -> Verdict:
         subtask, knowledge = observed.subtask, self._knowledge
         if context is None or context.when is not When.BEFORE:
@@ -182,6 +187,12 @@ class PreconditionDetector:
         false = [v for v in found if v.truth is Truth.FALSE]
         score = 1.0 - max((weight(v) for v in false), default=0.0)
         if score < self._config.threshold:
+            if silent:
+                by_hand = [v for v in false if v.precondition.by_hand]
+                if not by_hand:
+                    note = f"{_SILENT}; {_listed('violated', false)}"
+                    return self._verdict(Decision.PROCEED, None, references, note)
+                false = by_hand
             asked = [v for v in false if 1.0 - weight(v) < self._config.threshold]
             facts = tuple(dict.fromkeys(v.literal for v in asked))
             note = _listed("violated", false)
