@@ -15,9 +15,11 @@ from forestall.assembly.eyes import eyes_for, is_picture
 from forestall.assembly.own_domain import corrected
 from forestall.assembly.parts import Assembly
 from forestall.assembly.sources import MEMORY_SUFFIXES, Source, demonstrations_from, scoped
+from forestall.assembly.stored import _check as check_words
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
 from forestall.domain.words import Words
+from forestall.errors import InputError
 from forestall.handed import Scene
 from forestall.kinds import DOMAIN, LIMIT, PERCEIVER, STRATEGY
 from forestall.learning.learn import learn
@@ -54,6 +56,7 @@ class Monitor(RunMonitor):
 
     _scenes: Scenes
     _words: Words
+    _learnt: bool = False
     domain: Domain
     demonstrations: tuple[Demonstration, ...]
     limits: tuple[str, ...]
@@ -86,7 +89,8 @@ class Monitor(RunMonitor):
                 them. `Given` as the keyword `given` is what a file or flags said.
 
         Raises:
-            InputError: a source, a name or an option that is not valid; says what would be.
+            InputError: a source, a name or an option that is not valid, or a demonstration that
+                says of things what means nothing in the domain; says what would be.
         """
         given: Given = options.pop("given", Given())
         said = Given.named(options).over(given).over(DEFAULTS)
@@ -101,6 +105,7 @@ class Monitor(RunMonitor):
             own = _domain(domain)
             eyes = eyes_for(said, own)
             demonstrations = scoped(demonstrations_from(source, eyes), eyes.scope)
+            _check_demonstrations(demonstrations, own)
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
@@ -113,7 +118,7 @@ class Monitor(RunMonitor):
             config or MonitorConfig(limits=parts.part(LIMIT)),
         )
         monitor._scenes, monitor._words = Scenes(own), Words(own)
-        monitor.domain, monitor.limits = own, limits
+        monitor.domain, monitor.limits, monitor._learnt = own, limits, domain is None
         monitor.demonstrations = tuple(demonstrations)
         return monitor
 
@@ -128,10 +133,25 @@ class Monitor(RunMonitor):
         return super().check(seen, subtask)
 
     def _read(self, scene: Scene) -> Observation | SceneGraph:
-        """Also pictures as plain data (`perception.scene_dict`)."""
+        """Also pictures as plain data (`perception.scene_dict`).
+
+        A graph has no words but the domain's; one that is learnt may meet others, not judged.
+        """
         if isinstance(scene, Mapping) and is_picture(scene):
             scene = scene_from_dict(self._scenes, scene)
-        return super()._read(scene)
+        seen = super()._read(scene)
+        if isinstance(seen, SceneGraph):
+            check_words(seen, self._domain, self._learnt)
+        return seen
+
+
+def _check_demonstrations(demonstrations: Sequence[Demonstration], domain: Domain) -> None:
+    for d in demonstrations:
+        for number, step in enumerate(d.steps, 1):
+            try:
+                check_words(step.whole, domain, learnt=False)
+            except InputError as error:
+                raise InputError(f"demonstration {d.id}, step {number}: {error}") from error
 
 
 def _domain(said: Domain | str | Path) -> Domain:

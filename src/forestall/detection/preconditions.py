@@ -218,7 +218,7 @@ class PreconditionDetector:
         relations = [
             f"{r}: nothing is known of the relation {r.predicate}, so it may matter"
             for r in observed.relations
-            if r.predicate not in self._domain.predicates
+            if r.predicate not in self._domain.relations
             and (r.subject in about or r.object in about)
         ]
         attributes = [
