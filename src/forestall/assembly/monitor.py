@@ -5,16 +5,17 @@ Called by users; calls `sources`, `learning` and the registry's parts.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Choice, Given, choices, domain_of
-from forestall.assembly.corrections import remembering
+from forestall.assembly.corrections import MEMORIES, beside_all, of_no_task, remembering
 from forestall.assembly.eyes import eyes_for, is_picture
 from forestall.assembly.own_domain import corrected
 from forestall.assembly.parts import Assembly
-from forestall.assembly.sources import MEMORY_SUFFIXES, Source, demonstrations_from, scoped
+from forestall.assembly.sources import Source, demonstrations_from, scoped
 from forestall.assembly.stored import _check as check_words
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
@@ -76,7 +77,8 @@ class Monitor(RunMonitor):
         Args:
             source: a memory file, folders of runs, graphs, lists of (subtask, scene), or a mixture;
                 see `assembly.sources`. With a domain scenes may be pictures. Corrections by hand
-                beside a memory file count (docs/preconditions.md).
+                beside each memory file count (docs/preconditions.md); one for a task that nothing
+                demonstrates is a warning.
             domain: a domain, its name, or a file of one. Without it skills, relations and
                 attributes are those that the demonstrations use, what always held before a skill
                 is needed, what always changed is what it does; `limits` says what that leaves out.
@@ -95,22 +97,26 @@ class Monitor(RunMonitor):
         given: Given = options.pop("given", Given())
         said = Given.named(options).over(given).over(DEFAULTS)
         limits: tuple[str, ...] = ()
-        one = isinstance(source, str | Path) and str(source).endswith(MEMORY_SUFFIXES)
-        memory = str(source) if one else None
+        memories: list[Path] = []
         if domain is None:
-            demonstrations = demonstrations_from(source)
+            demonstrations = demonstrations_from(source, memories=memories)
             learnt = learn(demonstrations, hands=hands)
-            own, limits = corrected(learnt.domain, memory), learnt.limits
+            own, limits = corrected(learnt.domain, memories), learnt.limits
         else:
             own = _domain(domain)
             eyes = eyes_for(said, own)
-            demonstrations = scoped(demonstrations_from(source, eyes), eyes.scope)
+            demonstrations = scoped(demonstrations_from(source, eyes, memories), eyes.scope)
             _check_demonstrations(demonstrations, own)
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
-        chosen = remembering(chosen, memory)
-        parts = Assembly(chosen, own, demonstrations, {"states": {}})
+        one = isinstance(source, str | Path) and memories == [Path(source)]
+        chosen = remembering(chosen, str(source) if one else None)
+        lent = {"states": {}, MEMORIES: tuple(memories)}
+        parts = Assembly(chosen, own, demonstrations, lent)
+        tasks = [d.task for d in demonstrations]
+        for text in of_no_task(beside_all(memories, own), tasks):
+            warnings.warn(text, stacklevel=2)
         monitor = cls(
             parts.part(STRATEGY),
             own,
