@@ -22,6 +22,7 @@ from forestall.errors import InputError
 from forestall.memory.store import open_store
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeRecord
+from forestall.types.graph import SceneGraph
 from forestall.types.verdict import Calibration, Decision, Verdict
 
 SYMBOLIC = Given.named({"world": "symbolic", "perceiver": "given-graph"})
@@ -126,7 +127,8 @@ def test_a_judge_that_alarms_in_good_runs_is_silent_under_the_bound(
     bad = ran(demonstrations, "tray-full", name="preconditions", calibration=file)
     silenced = [v for v in verdicts(bad) if "too many good runs had one" in v.note]
     assert silenced
-    assert all(v.decision is Decision.PROCEED and v.p_value == 1.0 for v in silenced)
+    assert not any(v.judged for v in silenced)
+    assert all(v.decision is Decision.PROCEED and v.score is None for v in silenced)
 
 
 def test_a_monitor_takes_it_and_other_options_or_demonstrations_are_refused(
@@ -150,6 +152,40 @@ def test_a_monitor_takes_it_and_other_options_or_demonstrations_are_refused(
         monitor(demonstrations, name="preconditions")
     with pytest.raises(InputError, match=r"gone\.toml"):
         monitor(demonstrations, calibration=tmp_path / "gone.toml")
+
+
+def test_what_other_eyes_saw_of_the_same_runs_is_another_memory(
+    demonstrations: list[Demonstration], tmp_path: Path
+) -> None:
+    file, memory = tmp_path / "calibration.toml", tmp_path / "memory.db"
+    write_calibration(file, calibrate(demonstrations, level=0.2))
+    said = {"name": "scene-graph", "calibration": file}
+
+    def monitor(source: object) -> Monitor:
+        return Monitor.from_demonstrations(source, "bench", detector=said, perceiver="given-graph")
+
+    with open_store(memory, create=True) as store:
+        for d in demonstrations:
+            store.add(d)
+    assert monitor(memory).demonstrations
+    assert monitor(demonstrations[::-1]).demonstrations
+
+    def blind(graph: SceneGraph) -> SceneGraph:
+        nodes = (replace(n, states=tuple((a, None) for a, _ in n.states)) for n in graph.nodes)
+        return replace(graph, nodes=tuple(nodes))
+
+    for other in (
+        replace(demonstrations[0], perception=(("state_estimator", "other"),)),
+        replace(
+            demonstrations[0],
+            steps=tuple(
+                replace(s, graph=blind(s.graph), whole=blind(s.whole))
+                for s in demonstrations[0].steps
+            ),
+        ),
+    ):
+        with pytest.raises(InputError, match="others or were seen otherwise: run forestall"):
+            monitor([other, *demonstrations[1:]])
 
 
 def test_later_runs_as_good_as_before_speak_for_it(demonstrations: list[Demonstration]) -> None:

@@ -38,7 +38,8 @@ def test_it_reads_back_equal(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("format = 1", "format = 7", "format: 1, as this version writes it, is expected, got 7"),
+        ("format = 2", "format = 7", "format: 2, as this version writes it, is expected, got 7"),
+        ("format = 2", "format = 1", "run forestall calibrate again"),
         ("level = 0.05", "level = 1.5", "level 1.5"),
         ("level = 0.05", "level = 'high'", "level: a number is expected"),
         ('parts = "none"', 'parts = "room"', "parts: one of 'none', 'undo', 'skill' is expected"),

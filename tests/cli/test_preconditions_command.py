@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from forestall import Monitor, Outcome
 from forestall.assembly.sources import demonstrations_from
 from forestall.cli.main import call
+from forestall.learning.learn import learn
 from forestall.memory.store import open_store
 from stranger import GRASP, INSERT, TWELVE, UNSCREW, scene
 
@@ -278,3 +280,41 @@ def test_a_file_that_is_not_valid_is_told_with_its_place(
     assert call(["preconditions", "list", str(memory)]) == 2
     err = capsys.readouterr().err
     assert f"{corrections(memory)}: {says}" in err and len(err.splitlines()) == 1
+
+
+def test_corrections_count_wherever_their_memory_is_in_the_source(memory: Path) -> None:
+    assert edit(memory, "--add", "insert: thread(?hole)=tight", "--note", "it slips") == 0
+    fine = scene("hand")
+    elsewhere = memory.with_name("more.db")
+    with open_store(elsewhere, create=True) as store:
+        for d in demonstrations_from(TWELVE[:3]):
+            store.add(replace(d, id=f"other {d.id}"))
+    for source in (memory, [memory], memory.parent, (m for m in (elsewhere, memory))):
+        decision = Monitor.from_demonstrations(source).check(fine, INSERT)
+        assert decision.outcome is Outcome.HOLD and "it slips" in decision.why
+    own = learn(demonstrations_from(memory)).domain
+    for mixture in ([memory], [TWELVE[0], memory]):
+        decision = Monitor.from_demonstrations(mixture, own).check(fine, INSERT)
+        assert decision.outcome is not Outcome.PROCEED
+    assert Monitor.from_demonstrations(elsewhere).check(fine, INSERT).outcome is Outcome.PROCEED
+
+
+def test_what_one_memory_adds_no_other_leaves_out(memory: Path) -> None:
+    other = memory.with_name("another.db")
+    with open_store(other, create=True) as store:
+        for d in demonstrations_from(TWELVE[:3]):
+            store.add(d)
+    assert edit(memory, "--add", CLEAN) == 0
+    assert edit(other, "--drop", CLEAN) == 0
+    for source in ([memory, other], [other, memory]):
+        verdict = Monitor.from_demonstrations(source).check(DIRTY, INSERT).verdict
+        assert verdict is not None and "a correction by hand" in verdict.note
+
+
+def test_a_correction_for_a_task_that_nothing_demonstrates_is_told(memory: Path) -> None:
+    text = '[[add]]\nbefore = "insert"\nfact = "thread(?hole)=tight"\ntask = "close the lid"\n'
+    corrections(memory).write_text(text, encoding="utf-8")
+    with pytest.warns(
+        UserWarning, match=r"thread\(\?hole\)=tight' counts in no task that is demon"
+    ):
+        Monitor.from_demonstrations(memory)

@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from forestall.calibration.fitted import CalibrationTable, JudgeThresholds
+from forestall.calibration.scores import JudgedBoundary, JudgedRun, Parts, scores_of
+from forestall.comparison.corrections import Correction, Corrections
 from forestall.comparison.preconditions import MiningConfig
 from forestall.detection.preconditions import PreconditionConfig, PreconditionDetector
 from forestall.domain.load import shipped
@@ -85,6 +88,23 @@ def test_what_was_not_seen_calls_for_another_look() -> None:
     assert verdict.note == "not observed: dirt(RoundHole-1)=clean (held in 4 of 4 demonstrations)"
 
 
+@pytest.mark.parametrize("value", ["yes", None])
+def test_an_argument_with_an_attribute_that_nobody_knows_calls_for_another_look(
+    value: str | None,
+) -> None:
+    plain = scene()
+    nodes = {n.id: n for n in plain.nodes}
+    for name, decision in (
+        ("RoundHole-1", Decision.LOOK_AGAIN),
+        ("Nut-1", Decision.PROCEED),
+    ):
+        more = replace(nodes[name], states=(*nodes[name].states, ("cracked", value)))
+        graph = replace(plain, nodes=tuple({**nodes, name: more}.values()))
+        verdict = PreconditionDetector(BENCH).judge(graph, None, FOUR)
+        assert verdict.decision is decision
+        assert ("the attribute cracked" in verdict.note) is (decision is Decision.LOOK_AGAIN)
+
+
 def test_one_demonstration_raises_an_alarm_that_says_so() -> None:
     verdict = PreconditionDetector(BENCH).judge(scene(IN_THE_HOLE), None, FOUR[:1])
     assert verdict.decision is Decision.REPLAN
@@ -98,6 +118,37 @@ def test_one_demonstration_raises_an_alarm_that_says_so() -> None:
 def test_a_fact_that_varied_is_no_precondition() -> None:
     varied = references(scene(), scene(dirty="dirty"), scene(), scene())
     assert PreconditionDetector(BENCH).judge(scene(dirty="dirty"), None, varied).score == 1.0
+
+
+def silenced() -> JudgeThresholds:
+    """Thresholds that leave no alarm: every good run had one."""
+    alarm = JudgedBoundary("preconditions", INSERT.skill, 0.0)
+    runs = [JudgedRun(f"run-{i}", "t", (alarm,)) for i in range(30)]
+    return CalibrationTable(scores_of(runs, Parts.NONE, ()), 0.05).of("preconditions", "t")
+
+
+def test_a_judge_that_a_calibration_silences_has_no_voice() -> None:
+    detector = PreconditionDetector(BENCH, thresholds=silenced())
+    full = detector.judge(scene(IN_THE_HOLE), None, FOUR)
+    assert not full.judged
+    assert (full.decision, full.score, full.lacking) == (Decision.PROCEED, None, ())
+    assert "too many good runs had one" in full.note and "free(RoundHole-1)" in full.note
+    fine = detector.judge(scene(), None, FOUR)
+    assert fine.judged and fine.decision is Decision.PROCEED
+    unseen = detector.judge(scene(dirty=None), None, FOUR)
+    assert unseen.decision is Decision.LOOK_AGAIN
+
+
+def test_no_calibration_silences_what_a_person_added() -> None:
+    fact = Literal.parse("free(?hole)")
+    added = Corrections("by hand", (Correction(True, INSERT.skill, fact),))
+    detector = PreconditionDetector(BENCH, thresholds=silenced(), corrections=added)
+    verdict = detector.judge(scene(IN_THE_HOLE, dirty="dirty"), None, FOUR)
+    assert (verdict.decision, verdict.score) == (Decision.REPLAN, 0.0)
+    assert [str(x) for x in verdict.lacking] == ["free(RoundHole-1)"]
+    assert verdict.note == "violated: free(RoundHole-1) (a correction by hand)"
+    assert (verdict.calibration, verdict.p_value) == (Calibration.FIXED, None)
+    assert not detector.judge(scene(dirty="dirty"), None, FOUR).judged
 
 
 def test_without_a_reference_nothing_is_judged() -> None:

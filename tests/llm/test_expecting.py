@@ -243,10 +243,13 @@ def test_without_an_answer_all_is_as_if_nobody_had_been_asked() -> None:
         assert replace(verdict, exchanges=()) == plain.judge(context.scoped, None, (), context)
 
 
-def test_what_cannot_be_seen_asks_for_a_look_and_no_more() -> None:
-    unseen = at(scene(hole=None))
-    assert judged(unseen, CLEAN)[0].decision is Decision.LOOK_AGAIN
-    assert judged(replace(unseen, may_look=False), CLEAN)[0].decision is Decision.PROCEED
+@pytest.mark.parametrize("may_look", [True, False])
+def test_what_cannot_be_seen_is_never_said_to_be_as_expected(may_look: bool) -> None:
+    unseen = replace(at(scene(hole=None)), may_look=may_look)
+    verdict, _ = judged(unseen, CLEAN)
+    assert verdict.decision is Decision.LOOK_AGAIN
+    assert "not observed: dirt(BoltHole-1)=clean" in verdict.note
+    assert "it is as the language model" not in verdict.note
 
 
 def test_what_was_said_is_kept_in_a_file_of_its_own(tmp_path: Path) -> None:

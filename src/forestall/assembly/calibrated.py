@@ -6,8 +6,9 @@ Called by the factories in `judging` and by `calibrating`; calls calibration.
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -86,20 +87,29 @@ def check_memory(
 ) -> None:
     """See that a run compares with the demonstrations that its calibration was made with.
 
+    The same runs that other eyes have seen (`forestall demos perceive`) are others.
+
     Raises:
         InputError: it does not.
     """
     if table.memory != digest_of_memory(demonstrations):
         raise InputError(
             f"the calibration {file} was made with {table.demonstrations} demonstrations, and this "
-            f"run compares with {len(demonstrations)} others: run forestall calibrate on its memory"
+            f"run compares with {len(demonstrations)} that are others or were seen otherwise: run "
+            "forestall calibrate on its memory"
         )
 
 
 def digest_of_memory(demonstrations: Sequence[Demonstration]) -> str:
-    """Sixteen hexadecimal digits of which demonstrations there are, in any order."""
-    names = "\n".join(sorted(d.id for d in demonstrations))
-    return hashlib.blake2b(names.encode(), digest_size=8).hexdigest()
+    """Sixteen hexadecimal digits of what demonstrations show and who saw it, in any order."""
+    hasher = hashlib.blake2b(digest_size=8)
+    for d in sorted(demonstrations, key=lambda d: d.id):
+        wholes = (*(s.whole for s in d.steps), *(() if d.final is None else (d.final,)))
+        steps = [(s.index, str(s.subtask)) for s in d.steps]
+        head = (d.id, d.task, sorted(d.perception), steps)
+        forms = [replace(g, subtask=None).to_json() for g in wholes]
+        hasher.update(json.dumps([head, forms], sort_keys=True).encode())
+    return hasher.hexdigest()
 
 
 def _task(parts: Parts) -> str | None:

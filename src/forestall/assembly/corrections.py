@@ -30,6 +30,9 @@ from forestall.types.plan import Subtask
 
 ENDING = ".preconditions.toml"
 OPTION = "corrections"
+MEMORIES = "memories"
+"""What a monitor lends: the memory files that its demonstrations come from."""
+
 TABLES = ("drop", "add")
 KEYS = ("before", "fact", "task", "note")
 
@@ -45,17 +48,48 @@ def beside(memory: str | Path) -> Path:
 
 
 def corrections_of(parts: Parts, said: str | None) -> Corrections | None:
-    """The corrections of a run: those of a file that was named, else those beside its memory.
+    """The corrections of a run: those of a file that was named, else those beside its memories.
 
     Raises:
         FileFormatError: see `read_corrections`.
     """
-    if said is None:
-        memory = parts.options(STORE).get("path")
-        if memory is None or not beside(memory).is_file():
-            return None
-        said = str(beside(memory))
-    return read_corrections(Path(said), parts.domain)
+    if said is not None:
+        return read_corrections(Path(said), parts.domain)
+    memory = parts.options(STORE).get("path")
+    try:
+        others: tuple[Path, ...] = parts.lent(MEMORIES)
+    except InputError:  # a run has one memory, which its store names
+        others = ()
+    return beside_all((*others, *(() if memory is None else (memory,))), parts.domain)
+
+
+def beside_all(memories: Iterable[str | Path], domain: Domain) -> Corrections | None:
+    """The corrections beside memories together; None where there are none.
+
+    What is left out comes before what is added, so that a need which anybody adds stands.
+
+    Raises:
+        FileFormatError: see `read_corrections`.
+    """
+    files = dict.fromkeys(beside(m) for m in memories)
+    found = [read_corrections(file, domain) for file in files if file.is_file()]
+    if not found:
+        return None
+    each = sorted((c for one in found for c in one.each), key=lambda c: c.adds)
+    return Corrections(", ".join(one.source for one in found), tuple(each))
+
+
+def of_no_task(corrections: Corrections | None, tasks: Iterable[str]) -> list[str]:
+    """A sentence for each correction for a task that no demonstration is of."""
+    if corrections is None:
+        return []
+    known = sorted({t for t in tasks if t})
+    return [
+        f"{corrections.source}: '{c}' counts in no task that is demonstrated: "
+        f"{UnknownNameError('task', c.task, known)}"
+        for c in corrections.each
+        if c.task and c.task not in known
+    ]
 
 
 def remembering(choices: Sequence[Choice], memory: str | None) -> tuple[Choice, ...]:

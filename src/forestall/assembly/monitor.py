@@ -5,19 +5,22 @@ Called by users; calls `sources`, `learning` and the registry's parts.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from forestall.assembly.configuration import Choice, Given, choices, domain_of
-from forestall.assembly.corrections import remembering
+from forestall.assembly.corrections import MEMORIES, beside_all, of_no_task, remembering
 from forestall.assembly.eyes import eyes_for, is_picture
 from forestall.assembly.own_domain import corrected
 from forestall.assembly.parts import Assembly
-from forestall.assembly.sources import MEMORY_SUFFIXES, Source, demonstrations_from, scoped
+from forestall.assembly.sources import Source, demonstrations_from, scoped
+from forestall.assembly.stored import _check as check_words
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
 from forestall.domain.words import Words
+from forestall.errors import InputError
 from forestall.handed import Scene
 from forestall.kinds import DOMAIN, LIMIT, PERCEIVER, STRATEGY
 from forestall.learning.learn import learn
@@ -54,6 +57,7 @@ class Monitor(RunMonitor):
 
     _scenes: Scenes
     _words: Words
+    _learnt: bool = False
     domain: Domain
     demonstrations: tuple[Demonstration, ...]
     limits: tuple[str, ...]
@@ -73,7 +77,8 @@ class Monitor(RunMonitor):
         Args:
             source: a memory file, folders of runs, graphs, lists of (subtask, scene), or a mixture;
                 see `assembly.sources`. With a domain scenes may be pictures. Corrections by hand
-                beside a memory file count (docs/preconditions.md).
+                beside each memory file count (docs/preconditions.md); one for a task that nothing
+                demonstrates is a warning.
             domain: a domain, its name, or a file of one. Without it skills, relations and
                 attributes are those that the demonstrations use, what always held before a skill
                 is needed, what always changed is what it does; `limits` says what that leaves out.
@@ -86,26 +91,32 @@ class Monitor(RunMonitor):
                 them. `Given` as the keyword `given` is what a file or flags said.
 
         Raises:
-            InputError: a source, a name or an option that is not valid; says what would be.
+            InputError: a source, a name or an option that is not valid, or a demonstration that
+                says of things what means nothing in the domain; says what would be.
         """
         given: Given = options.pop("given", Given())
         said = Given.named(options).over(given).over(DEFAULTS)
         limits: tuple[str, ...] = ()
-        one = isinstance(source, str | Path) and str(source).endswith(MEMORY_SUFFIXES)
-        memory = str(source) if one else None
+        memories: list[Path] = []
         if domain is None:
-            demonstrations = demonstrations_from(source)
+            demonstrations = demonstrations_from(source, memories=memories)
             learnt = learn(demonstrations, hands=hands)
-            own, limits = corrected(learnt.domain, memory), learnt.limits
+            own, limits = corrected(learnt.domain, memories), learnt.limits
         else:
             own = _domain(domain)
             eyes = eyes_for(said, own)
-            demonstrations = scoped(demonstrations_from(source, eyes), eyes.scope)
+            demonstrations = scoped(demonstrations_from(source, eyes, memories), eyes.scope)
+            _check_demonstrations(demonstrations, own)
         chosen = tuple(
             Choice(DOMAIN.name, own.name) if c.kind == DOMAIN.name else c for c in choices(said)
         )
-        chosen = remembering(chosen, memory)
-        parts = Assembly(chosen, own, demonstrations, {"states": {}})
+        one = isinstance(source, str | Path) and memories == [Path(source)]
+        chosen = remembering(chosen, str(source) if one else None)
+        lent = {"states": {}, MEMORIES: tuple(memories)}
+        parts = Assembly(chosen, own, demonstrations, lent)
+        tasks = [d.task for d in demonstrations]
+        for text in of_no_task(beside_all(memories, own), tasks):
+            warnings.warn(text, stacklevel=2)
         monitor = cls(
             parts.part(STRATEGY),
             own,
@@ -113,7 +124,7 @@ class Monitor(RunMonitor):
             config or MonitorConfig(limits=parts.part(LIMIT)),
         )
         monitor._scenes, monitor._words = Scenes(own), Words(own)
-        monitor.domain, monitor.limits = own, limits
+        monitor.domain, monitor.limits, monitor._learnt = own, limits, domain is None
         monitor.demonstrations = tuple(demonstrations)
         return monitor
 
@@ -128,10 +139,25 @@ class Monitor(RunMonitor):
         return super().check(seen, subtask)
 
     def _read(self, scene: Scene) -> Observation | SceneGraph:
-        """Also pictures as plain data (`perception.scene_dict`)."""
+        """Also pictures as plain data (`perception.scene_dict`).
+
+        A graph has no words but the domain's; one that is learnt may meet others, not judged.
+        """
         if isinstance(scene, Mapping) and is_picture(scene):
             scene = scene_from_dict(self._scenes, scene)
-        return super()._read(scene)
+        seen = super()._read(scene)
+        if isinstance(seen, SceneGraph):
+            check_words(seen, self._domain, self._learnt)
+        return seen
+
+
+def _check_demonstrations(demonstrations: Sequence[Demonstration], domain: Domain) -> None:
+    for d in demonstrations:
+        for number, step in enumerate(d.steps, 1):
+            try:
+                check_words(step.whole, domain, learnt=False)
+            except InputError as error:
+                raise InputError(f"demonstration {d.id}, step {number}: {error}") from error
 
 
 def _domain(said: Domain | str | Path) -> Domain:

@@ -5,10 +5,11 @@ Called by `checking`, `mined` and the command line.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from forestall.assembly.corrections import beside, needing, read_corrections
+from forestall.assembly.corrections import beside_all, needing
 from forestall.config import DEFAULT_DOMAIN
 from forestall.domain.load import shipped, shipped_names
 from forestall.domain.model import Domain
@@ -48,18 +49,18 @@ def domain_of_demonstrations(
         if all(fits(d, domain) for d in demonstrations):
             return OwnDomain(domain)
     found = learn(demonstrations)
-    return OwnDomain(corrected(found.domain, memory), True, found.limits)
+    memories = () if memory is None else (memory,)
+    return OwnDomain(corrected(found.domain, memories), True, found.limits)
 
 
-def corrected(domain: Domain, memory: str | None) -> Domain:
-    """A learnt domain, whose needs are mined themselves, with the corrections beside a memory.
+def corrected(domain: Domain, memories: Iterable[str | Path]) -> Domain:
+    """A learnt domain, whose needs are mined themselves, with the corrections beside memories.
 
     Raises:
         FileFormatError: see `corrections.read_corrections`.
     """
-    if memory is None or not beside(memory).is_file():
-        return domain
-    return needing(domain, read_corrections(beside(memory), domain))
+    found = beside_all(memories, domain)
+    return domain if found is None else needing(domain, found)
 
 
 def fits(demonstration: Demonstration, domain: Domain) -> bool:

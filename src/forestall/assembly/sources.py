@@ -41,7 +41,9 @@ Source = Any
 """A path, a `Demonstration`, a list of steps, or an iterable of these."""
 
 
-def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demonstration]:
+def demonstrations_from(
+    source: Source, eyes: Eyes | None = None, memories: list[Path] | None = None
+) -> list[Demonstration]:
     """Every demonstration of a source.
 
     Args:
@@ -49,6 +51,7 @@ def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demons
             wrote (`written`), or of one graph with its subtask; a folder of any of these; a
             `Demonstration`; a list of steps; or an iterable of all that.
         eyes: see scenes that are pictures; without them these are refused.
+        memories: every memory file that was read is added to them.
 
     Returns:
         Demonstrations with ids that differ, in the order of the source. Of the same one in several
@@ -58,17 +61,19 @@ def demonstrations_from(source: Source, eyes: Eyes | None = None) -> list[Demons
         InputError: something that is no demonstration, with its place.
         MemoryFileError: see `memory.store`.
     """
-    return gathered(source, eyes)[0]
+    return gathered(source, eyes, memories)[0]
 
 
-def gathered(source: Source, eyes: Eyes | None = None) -> tuple[list[Demonstration], int]:
+def gathered(
+    source: Source, eyes: Eyes | None = None, memories: list[Path] | None = None
+) -> tuple[list[Demonstration], int]:
     """Like `demonstrations_from`, and how many were left out because they were there already.
 
     Raises:
         InputError: something that is no demonstration, with its place.
         MemoryFileError: see `memory.store`.
     """
-    found = _from(source, eyes)
+    found = _from(source, eyes, [] if memories is None else memories)
     if not found:
         raise InputError(f"no demonstration was found in {_said(source)}")
     named = _named(found)
@@ -197,18 +202,18 @@ def _over(said: SceneGraph, seen: SceneGraph) -> SceneGraph:
     )
 
 
-def _from(source: Source, eyes: Eyes | None) -> list[Demonstration]:
+def _from(source: Source, eyes: Eyes | None, memories: list[Path]) -> list[Demonstration]:
     if isinstance(source, Demonstration):
         return [source]
     if isinstance(source, str | Path):
-        return _from_path(Path(source), eyes)
+        return _from_path(Path(source), eyes, memories)
     if isinstance(source, Mapping) or _is_steps(source):
         return [written(source, None, eyes)]
     if isinstance(source, Iterable):
         found = []
         for number, part in enumerate(source, 1):
             try:
-                found += _from(part, eyes)
+                found += _from(part, eyes, memories)
             except InputError as error:
                 raise InputError(f"demonstration {number}: {error}") from error
         return found
@@ -218,10 +223,11 @@ def _from(source: Source, eyes: Eyes | None) -> list[Demonstration]:
     )
 
 
-def _from_path(path: Path, eyes: Eyes | None) -> list[Demonstration]:
+def _from_path(path: Path, eyes: Eyes | None, memories: list[Path]) -> list[Demonstration]:
     if not path.exists():
         raise FileFormatError(f"{path}: there is no such file or folder")
     if path.is_file() and path.suffix in MEMORY_SUFFIXES:
+        memories.append(path)
         with open_store(path) as store:
             return list(store.required())
     if path.is_file() and path.suffix == ".json" and path.name not in RECORD_FILES:
@@ -239,7 +245,7 @@ def _from_path(path: Path, eyes: Eyes | None) -> list[Demonstration]:
             d
             for inside in sorted(path.iterdir())
             if _shows(inside)
-            for d in _from_path(inside, eyes)
+            for d in _from_path(inside, eyes, memories)
         ]
     known = ", ".join((".json", *MEMORY_SUFFIXES))
     raise FileFormatError(f"{path} shows no demonstration: files may be {known}")

@@ -19,7 +19,10 @@ from forestall.files import replace_file
 from forestall.reading.documents import MOST_TOML_BYTES, read_toml
 from forestall.reading.fields import Field
 
-FORMAT = 1
+FORMAT = 2
+
+_OF_IDS = 1
+"""The format whose `memory` told demonstrations by their ids alone, whoever had seen them."""
 
 UNJUDGED = "-"
 """Stands where a run has no score."""
@@ -117,6 +120,11 @@ def _table(field: Field) -> CalibrationTable:
     for key in field.value:
         if key not in _KEYS:
             raise FileFormatError(f"unknown key {key!r}: known are {', '.join(_KEYS)}")
+    if field["format"].value == _OF_IDS:
+        raise FileFormatError(
+            f"format {_OF_IDS} does not say what the demonstrations showed: run forestall "
+            "calibrate again"
+        )
     if field["format"].value != FORMAT:
         field["format"].fail(f"{FORMAT}, as this version writes it,")
     columns = field["columns"].tuple_of(_column)

@@ -101,7 +101,7 @@ class CalibrationTable:
         irreversible: skills that count as such.
         by_task: whether each task has thresholds of its own where its runs suffice.
         options: judge → its options as plain data, with those of what finds its references.
-        memory: digest of the demonstrations that were compared with.
+        memory: digest of what the demonstrations that were compared with show, and who saw it.
         demonstrations: how many these are.
         held_out: whether the runs were compared with other demonstrations; else each with all but
             itself.

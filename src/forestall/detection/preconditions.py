@@ -43,6 +43,9 @@ from forestall.types.verdict import (
 _TOLD = 3
 """How many facts a note names."""
 
+_SILENT = "no alarm, because too many good runs had one, so nothing was judged"
+"""What is told of a violation where a calibration leaves no alarm."""
+
 _KEPT = 256
 """How many sets of mined preconditions are remembered."""
 
@@ -74,18 +77,20 @@ class PreconditionDetector:
     """Judges by mined preconditions (implements `Detector`).
 
     - a precondition is violated whose weight the threshold asks for: replan;
-    - none is, but one could not be observed, or an argument has a relation that the domain does
-      not know: look again, because what was not seen or not known is neither;
+    - none is, but one could not be observed, or an argument has a relation or an attribute that
+      the domain does not know: look again, because what was not seen or not known is neither;
     - all hold: proceed; a note says what other tasks ask and does not hold, where nobody has shown
       such a subtask in the task at hand;
-    - nothing was mined: proceed without a score and with a note; nothing was judged.
+    - nothing was mined: proceed without a score and with a note; nothing was judged;
+    - a calibration leaves no alarm, and a precondition is violated that no person added: the same.
 
     Args:
         domain: what facts there are about arguments.
         mining: how much evidence a precondition needs.
         config: the threshold.
         thresholds: from a calibration, which has counted the alarms of good runs: as a judge that
-            says yes or no it may alarm or it may not, whatever the weight.
+            says yes or no it may alarm or it may not, whatever the weight; what a person added
+            alarms all the same.
         corrections: what a person says of what is mined.
         knowledge: what is known of the whole memory and of the plan; None: only the references of
             a boundary are.
@@ -130,29 +135,29 @@ class PreconditionDetector:
         context: BoundaryContext | None = None,
     ) -> Verdict:
         """See which mined preconditions hold on the scoped graph of a boundary."""
-        verdict = self._judge(observed, references, context)
+        line = None
+        if self._thresholds is not None:
+            line = drawn(self._thresholds, observed.subtask, 1.0)
+        silent = line is not None and line.value <= 0
+        verdict = self._judge(observed, references, context, silent)
         if context is not None:
             verdict = replace(verdict, exchanges=self._expectations.asked(context))
-        if self._thresholds is None or verdict.score is None:
+        alarm = verdict.decision is Decision.REPLAN
+        if line is None or verdict.score is None or (silent and alarm):
             return verdict
-        fits = 0.0 if verdict.decision is Decision.REPLAN else 1.0
-        line = drawn(self._thresholds, observed.subtask, 1.0)
-        verdict = replace(
+        return replace(
             verdict,
             calibration=line.calibration,
             note="; ".join(n for n in (verdict.note, line.note) if n),
-            p_value=rarity(self._thresholds, observed.subtask, fits),
+            p_value=rarity(self._thresholds, observed.subtask, 0.0 if alarm else 1.0),
         )
-        if line.value > 0 or verdict.decision is not Decision.REPLAN:
-            return verdict
-        note = f"no alarm, because too many good runs had one; {verdict.note}"
-        return replace(verdict, decision=Decision.PROCEED, threshold=0.0, note=note, lacking=())
 
     def _judge(
         self,
         observed: SceneGraph,
         references: Sequence[Reference],
         context: BoundaryContext | None,
+        silent: bool,
     ) -> Verdict:
         subtask, knowledge = observed.subtask, self._knowledge
         if context is None or context.when is not When.BEFORE:
@@ -182,17 +187,18 @@ class PreconditionDetector:
         false = [v for v in found if v.truth is Truth.FALSE]
         score = 1.0 - max((weight(v) for v in false), default=0.0)
         if score < self._config.threshold:
+            if silent:
+                by_hand = [v for v in false if v.precondition.by_hand]
+                if not by_hand:
+                    note = f"{_SILENT}; {_listed('violated', false)}"
+                    return self._verdict(Decision.PROCEED, None, references, note)
+                false = by_hand
             asked = [v for v in false if 1.0 - weight(v) < self._config.threshold]
             facts = tuple(dict.fromkeys(v.literal for v in asked))
             note = _listed("violated", false)
             verdict = self._verdict(Decision.REPLAN, score, references, note, facts)
             return replace(verdict, expected_by=max(false, key=weight).precondition.expected_by)
-        look = context is not None and context.may_look
-        unseen = [
-            v
-            for v in found
-            if v.truth is Truth.UNOBSERVED and (look or not v.precondition.expected_by)
-        ]
+        unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
         strange = self._strange(observed, subtask)
         if unseen or strange:
             seen_not = [_listed("not observed", unseen)] if unseen else []
@@ -208,12 +214,20 @@ class PreconditionDetector:
 
     def _strange(self, observed: SceneGraph, subtask: Subtask) -> list[str]:
         """What is said of an argument in words that the domain lacks: it may matter or not."""
-        return [
+        about = {name for a in subtask.args for name in observed.matches(a)}
+        relations = [
             f"{r}: nothing is known of the relation {r.predicate}, so it may matter"
             for r in observed.relations
-            if r.predicate not in self._domain.predicates
-            and (r.subject in subtask.args or r.object in subtask.args)
+            if r.predicate not in self._domain.relations
+            and (r.subject in about or r.object in about)
         ]
+        attributes = [
+            f"{n.id}: nothing is known of the attribute {attribute}, so it may matter"
+            for n in observed.nodes
+            for attribute, _ in (n.states if n.id in about else ())
+            if attribute not in self._domain.attributes
+        ]
+        return relations + attributes
 
     def _not_judged(
         self,

@@ -16,7 +16,8 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
     """Arguments, what holds them, what is in, on or before them, the hand, devices at work.
 
     A category name as argument stands for every node of that category. What holds many things by
-    nature loses its contents, unless the skill itself asks for them.
+    nature loses its contents, unless the skill itself asks for them. What is said of an argument in
+    a relation that the domain does not know is kept: it may matter.
     """
     if config.whole:
         return SceneGraph(graph.nodes, graph.relations, subtask, graph.hidden)
@@ -40,12 +41,16 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
         if r.predicate == domain.roles.blocking and r.object in arguments
     }
     kept |= _devices(graph, arguments | _direct(graph, arguments, domain), domain)
+    strange = [r for r in graph.relations if r.predicate not in domain.relations]
+    pairs = [{r.subject, r.object} for r in strange]
+    kept |= {name for pair in pairs if pair & arguments for name in pair}
     nodes = tuple(n for n in graph.nodes if n.id in kept)
     ids = {n.id for n in nodes}
+    telling = {*domain.scored, *(r.predicate for r in strange)}
     relations = tuple(
         r
         for r in graph.relations
-        if r.predicate in domain.scored and r.subject in ids and r.object in ids
+        if r.predicate in telling and r.subject in ids and r.object in ids
     )
     return SceneGraph(nodes, relations, subtask, tuple(h for h in graph.hidden if h in ids))
 
