@@ -124,8 +124,8 @@ def test_what_was_not_seen_never_proceeds_whatever_the_score_is(
 def test_a_sequence_is_judged_before_the_subtasks_of_a_plan(
     memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written(tmp_path / "run" / "step-2", HELD, MUG, time_s=14.0)
-    written(tmp_path / "run" / "step-10", PLATE, MUG, POTATO, time_s=15.0)
+    written(tmp_path / "run" / "step-02", HELD, MUG, time_s=14.0)
+    written(tmp_path / "run" / "step-3", PLATE, MUG, POTATO, time_s=15.0)
     written(tmp_path / "run" / "step-1", PLATE, MUG, time_s=4.0)
     (tmp_path / "run" / "notes.txt").write_text("not a scene")
     plan = tmp_path / "plan.txt"
@@ -136,18 +136,30 @@ def test_a_sequence_is_judged_before_the_subtasks_of_a_plan(
     assert code == 1 and told["outcome"] == "replan"
     assert [(Path(s["scene"]).name, s["subtask"], s["outcome"]) for s in told["scenes"]] == [
         ("step-1", "pick_up(Plate-1)", "proceed"),
-        ("step-2", "put_on(Plate-1, CounterTop-1)", "proceed"),
-        ("step-10", "pick_up(Plate-1)", "replan"),
+        ("step-02", "put_on(Plate-1, CounterTop-1)", "proceed"),
+        ("step-3", "pick_up(Plate-1)", "replan"),
     ]
     text = page.read_text(encoding="utf-8")
     assert told["page"] == str(page) and "data:image/" in text
     assert "alarm, replanned" in text and "put_on" in text and "stored observations" in text
-    scenes = [str(tmp_path / "run" / name) for name in ("step-10", "step-2")]
+    scenes = [str(tmp_path / "run" / name) for name in ("step-3", "step-02")]
     assert call(["check", *scenes, *asked]) == 1
     out = capsys.readouterr().out
-    assert "step-10: replan: before pick_up(Plate-1)" in out
+    assert "step-3: replan: before pick_up(Plate-1)" in out
     assert "corrected plan, checked on what is seen:\n    1. navigate_to_obj(Potato-1)" in out
     assert "2 scenes: " in out
+
+
+def test_before_the_same_subtask_numbers_may_have_gaps(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(tmp_path / "run" / "07", PLATE, MUG, time_s=4.0)
+    written(tmp_path / "run" / "020", PLATE, MUG, time_s=14.0)
+    (tmp_path / "run" / "7.png").write_text("a picture of scene 7")
+    (tmp_path / "run" / "take.mp4").write_text("no scene, and no number of one")
+    asked = ["--subtask", STEP, "--memory", str(memory)]
+    code, told = checked(capsys, [tmp_path / "run"], *asked)
+    assert (code, [Path(s["scene"]).name for s in told["scenes"]]) == (0, ["07", "020"])
 
 
 def test_every_scene_may_be_judged_before_the_same_subtask(memory: Path, tmp_path: Path) -> None:
@@ -179,6 +191,11 @@ def test_every_scene_may_be_judged_before_the_same_subtask(memory: Path, tmp_pat
         (["absent.json", "--subtask", STEP], "cannot read scene graph absent.json"),
         (["nothing", "--subtask", STEP], "nothing holds no observation.json, and no observation"),
         (["twice", "--subtask", STEP], "graph-1.json has the same number as 01"),
+        (["half", "--subtask", STEP], "half/02 has a number and is no scene: a folder with obs"),
+        (["half", "--plan", f"{STEP}; {LATER}"], "half/02 has a number and is no scene"),
+        (["loud", "--subtask", STEP], "loud/2.JSON has a number and is no scene"),
+        (["gap", "--plan", f"{STEP}; {LATER}"], "gap has no scene with the number 2: those"),
+        (["late", "--plan", f"{STEP}; {LATER}"], "late has no scene with the number 1: those"),
         (["unnumbered", "--subtask", STEP], "a number in its name must say when it comes"),
         (["graph.json", "--subtask", STEP], "graph.json: unknown relation 'insid': did you mean"),
         (["within.json", "--subtask", STEP], "Mug-1, Plate-1: a thing cannot be in or on itself"),
@@ -195,8 +212,12 @@ def test_what_is_not_valid_is_told_in_a_sentence(
     says: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for name in ("fine", "twice/01", "unnumbered/first"):
+    for name in ("fine", "twice/01", "unnumbered/first", "half/01", "half/03", "loud/1"):
         written(tmp_path / name, PLATE, MUG)
+    (tmp_path / "half" / "02").mkdir()
+    for name in ("loud/2.JSON", "gap/1.json", "gap/3.json", "late/2.json"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(json.dumps(GRAPH))
     (tmp_path / "nothing").mkdir()
     graph = GRAPH | {"relations": [["Mug-1", "insid", "Plate-1"]]}
     for name in ("graph.json", "twice/graph-1.json"):

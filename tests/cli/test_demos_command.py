@@ -58,6 +58,24 @@ def test_what_is_equal_is_added_once_in_one_command_as_over_several(
         assert list(other.required()) == [d for d in (first, second) if d.task == "t"]
 
 
+def test_what_a_folder_holds_besides_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, memory = tmp_path / "shown", tmp_path / "memory.db"
+    told = json.dumps({"steps": [{"subtask": INSERT, "scene": scene("hand")}]})
+    for name in ("a.json", "b.jsn", "more/c.json", ".hidden", "seen/observation.json"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(told, encoding="utf-8")
+    assert call(["demos", "add", str(memory), str(folder)]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"1 demonstrations added to {memory}\n"
+    unknown, nested = err.splitlines()
+    assert unknown == f"left out: {folder / 'b.jsn'}: files may be .json, .db, .sqlite, .sqlite3"
+    assert nested == f"left out: {folder / 'more'}: no folder of a run"
+    assert call(["demos", "add", str(memory), str(folder / "a.json")]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_repeats_in_a_memory_are_copied_once(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
         (ZeroDivisionError("division by zero"), 70),
         (MemoryError(), 70),
         (RecursionError("maximum recursion depth exceeded"), 70),
+        (BrokenPipeError(32, "Broken pipe"), 70),
         (SystemExit(1), 70),
         (AssertionError(), 70),
         (KeyboardInterrupt(), 130),
@@ -102,8 +104,8 @@ def test_a_package_that_cannot_be_imported_is_no_alarm(tmp_path: Path) -> None:
     assert "internal error: RuntimeError: damaged" in done.stderr
 
 
-@pytest.mark.parametrize("arguments", [["bench", "all", "--help"], ["parts"]])
-def test_a_reader_that_has_seen_enough_is_no_fault(arguments: list[str]) -> None:
+def unheard(arguments: Sequence[str]) -> int:
+    """The exit code of a command to whose answer nobody listens; it has to be silent about that."""
     code = "import sys; from forestall.cli.main import main; main(sys.argv[1:])"
     with subprocess.Popen(
         [sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -111,7 +113,27 @@ def test_a_reader_that_has_seen_enough_is_no_fault(arguments: list[str]) -> None
         assert run.stdout is not None and run.stderr is not None
         run.stdout.close()
         assert run.stderr.read() == b""
-    assert run.returncode == 0
+    return run.returncode
+
+
+@pytest.mark.parametrize("arguments", [["bench", "all", "--help"], ["parts"]])
+def test_a_reader_that_has_seen_enough_is_no_fault(arguments: list[str]) -> None:
+    assert unheard(arguments) == 0
+
+
+def test_an_answer_that_nobody_hears_keeps_its_code(tmp_path: Path) -> None:
+    wrong = tmp_path / "task.toml"
+    wrong.write_text("nmae = 1\n", "utf-8")
+    assert call(["tasks", "check", str(wrong)]) == 1
+    assert unheard(["tasks", "check", str(wrong)]) == 1
+
+
+def test_an_error_that_nobody_hears_keeps_its_code() -> None:
+    code = "import sys; from forestall.cli.main import main; main(['rnu'])"
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE) as run:
+        assert run.stderr is not None
+        run.stderr.close()
+    assert run.returncode == 2
 
 
 @pytest.mark.parametrize(

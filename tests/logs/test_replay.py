@@ -2,21 +2,26 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from log_samples import STEPS, observation, run, write
+from log_samples import HEAD, STEPS, observation, run, write
 
 from forestall.assembly.configuration import Given, run_config
 from forestall.assembly.log_folder import FolderWriter
 from forestall.assembly.make import prepare, run_episode
 from forestall.cli.main import call
 from forestall.errors import InputError
+from forestall.logs.layout import Layout, Step
+from forestall.logs.moments import chosen, moments_of, notes_of
+from forestall.logs.writing import Executed, LogWriter
 from forestall.records.record import RunRecorder
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Subtask
 from forestall.types.recorded import Look
 from forestall.worlds.replay.world import ReplayWorld
+from perception.synthetic import Solid, at, looking, observed
 
 SYMBOLIC = Given.named({"world": "symbolic", "perceiver": "given-graph"})
 
@@ -100,6 +105,101 @@ def test_what_cannot_be_replayed_says_why(
     file.write_text(file.read_text().replace(STEPS[1], "pick up"))
     assert call(["replay", f"folder:{tmp_path / 'log'}", *plan_check]) == 2
     assert "cannot read 'pick up' as a subtask" in capsys.readouterr().err
+
+
+def test_runs_that_cannot_be_read_are_named_beside_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = recorded(tmp_path / "runs" / "good", "fasten-plate")
+    flags = ["--domain", "bench", "--strategy", "plan-check"]
+    assert call(["replay", f"record:{good}", *flags]) == 0
+    cut = recorded(tmp_path / "runs" / "cut", "fasten-plate") / "record.json"
+    cut.write_text(cut.read_text("utf-8")[:500], "utf-8")
+    capsys.readouterr()
+    command = ["replay", f"record:{tmp_path / 'runs'}", *flags]
+    assert call(command) == 4
+    out, err = capsys.readouterr()
+    assert "good: went well" in out
+    assert err.startswith("cut: not judged: ") and len(err.splitlines()) == 1
+    assert call([*command, "--json"]) == 4
+    judged, unread = json.loads(capsys.readouterr().out)
+    assert (judged["run"], judged["why_not"]) == ("good", "") and judged["timeline"]
+    assert (unread["run"], unread["timeline"]) == ("cut", []) and unread["why_not"] in err
+    assert judged.keys() == unread.keys()
+    assert call([*command, "--run", "good"]) == 0
+    assert call([*command, "--run", "cut"]) == 2
+
+
+COUNTER = Solid("CounterTop-1", (-1.0, 0.0, 0.86), (1.0, 0.6, 0.9))
+PLATE = at("Plate-1", 0.1, 0.3, 0.9, (0.22, 0.22, 0.02), True)
+POSE = looking((0.0, -0.7, 1.65), (0.0, 0.3, 0.9))
+
+
+def plate_log(writer: LogWriter, name: str, times_s: tuple[float, ...] = (0.0, 1.0, 4.0)) -> None:
+    """Looks at a plate on a counter, which is said to be taken and put back."""
+    writer.begin(replace(HEAD, name=name))
+    for number, time_s in enumerate(times_s):
+        writer.look(observed([COUNTER, PLATE], POSE, time_s=time_s))
+        if number + 1 < len(times_s):
+            done = Subtask.parse(("pick_up(Plate-1)", "put_on(Plate-1, CounterTop-1)")[number])
+            writer.executed(Executed(done, SkillStatus.SUCCEEDED, ""))
+    writer.finish(True, "")
+
+
+def test_a_look_that_cannot_be_read_does_not_hide_the_other_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("one", "two"):
+        (tmp_path / "logs").mkdir(exist_ok=True)
+        plate_log(FolderWriter(tmp_path / "logs" / name), name)
+    (tmp_path / "logs" / "one" / "0002" / "observation.json").unlink()
+    command = ["replay", f"folder:{tmp_path / 'logs'}", "--strategy", "plan-check", "--json"]
+    assert call(command) != 0
+    judged, unread = json.loads(capsys.readouterr().out)
+    assert (judged["run"], unread["run"]) == ("two", "one")
+    assert "0002" in unread["why_not"]
+    (tmp_path / "logs" / "two" / "0002" / "observation.json").unlink()
+    assert call(command) == 2
+    assert "no run of it can be used" in (err := capsys.readouterr().err) and "one: " in err
+
+
+def test_a_step_that_no_picture_shows_as_it_begins_is_not_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mcap")
+    from forestall.logs.mcap_out import McapWriter
+
+    log, steps = tmp_path / "run.mcap", tmp_path / "steps.csv"
+    plate_log(McapWriter(log), "run", (0.0, 3.0, 100.0))
+    command = ["replay", f"mcap:{log}", "--steps", str(steps), "--strategy", "plan-check", "--json"]
+
+    def told(*begins_s: float) -> tuple[int, list[tuple[str, str]], list[str]]:
+        rows = [f"{s},navigate_to_obj(Plate-1)\n" for s in begins_s]
+        steps.write_text("time_s,subtask\n" + "".join(rows), "utf-8")
+        code = call(command)
+        (one,) = json.loads(capsys.readouterr().out)
+        return code, [(m["outcome"], m["why"]) for m in one["timeline"]], one["left_out"]
+
+    code, said, left_out = told(0.5, 12.5)
+    assert (code, [outcome for outcome, _ in said]) == (0, ["proceed", "proceed"])
+    assert left_out == []
+    code, said, left_out = told(-2.0, 0.5, 63.0)
+    assert (code, [o for o, _ in said]) == (4, ["not judged", "proceed", "not judged"])
+    early, late = said[0][1], said[2][1]
+    assert early == "step 1 begins 2.0 s before the first picture"
+    assert late.startswith("step 3 begins 60.0 s after the last picture before it: at most 10 s")
+    assert left_out == [early, late]
+
+
+def test_of_pictures_none_that_is_stale_shows_a_step() -> None:
+    seconds = [1_000_000_000 * s for s in (10, 11, 12)]
+    begun = [Step(n, Subtask.parse(STEPS[0])) for n in (9_960_000_000, 11_500_000_000)]
+    looks = chosen(seconds, begun, Layout())
+    assert notes_of(moments_of(looks, begun, Layout().stale_s)) == []
+    late = [Step(9_900_000_000, begun[0].subtask), Step(13_100_000_000, begun[0].subtask)]
+    moments = moments_of(chosen(seconds, late, Layout()), late, Layout().stale_s)
+    assert [number for m in moments for number, _ in m.unshown] == [0, 1]
+    assert notes_of(moments_of(seconds, late)) == []
 
 
 BAD_RUNS = [

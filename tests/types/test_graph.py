@@ -72,6 +72,23 @@ def test_a_feature_has_a_direction(feature: bytes) -> None:
         ObjectNode("A-1", "A", feature=feature)
 
 
+def test_an_entry_that_no_graph_has_is_refused_with_the_near_one() -> None:
+    assert SceneGraph.from_json(kitchen().to_json()) == kitchen()
+    data = kitchen().to_json()
+    data["hiddne"] = data.pop("hidden")
+    with pytest.raises(FileFormatError, match=r"^unknown entry of a scene graph 'hiddne': did you"):
+        SceneGraph.from_json(data)
+
+
+@pytest.mark.parametrize(("meant", "written"), [("seen", "sen"), ("states", "statse")])
+def test_an_entry_that_no_node_has_is_refused_with_the_near_one(meant: str, written: str) -> None:
+    data = kitchen().to_json()
+    data["nodes"][1][written] = data["nodes"][1].pop(meant)
+    says = rf"^nodes\[1\]: unknown entry '{written}': did you mean '?{meant}"
+    with pytest.raises(FileFormatError, match=says):
+        SceneGraph.from_json(data)
+
+
 @pytest.mark.parametrize(
     ("change", "error", "says"),
     [

@@ -139,7 +139,7 @@ def judge_stored(
     Raises:
         InputError: a name, a scene, the subtask or the plan is not valid.
     """
-    scenes = scenes_in(paths)
+    scenes = scenes_in(paths, of_plan=question.subtask is None)
     if not scenes:
         raise InputError("nothing to judge: give an observation folder or a graph file")
     config = _config(question, given or Given(), all(map(is_graph, scenes)))

@@ -16,7 +16,7 @@ from forestall.assembly.eyes import eyes_for, is_picture
 from forestall.assembly.own_domain import corrected
 from forestall.assembly.parts import Assembly
 from forestall.assembly.sources import Source, demonstrations_from, scoped
-from forestall.assembly.stored import _check as check_words
+from forestall.assembly.stored import check_scene
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
 from forestall.domain.words import Words
@@ -147,7 +147,7 @@ class Monitor(RunMonitor):
             scene = scene_from_dict(self._scenes, scene)
         seen = super()._read(scene)
         if isinstance(seen, SceneGraph):
-            check_words(seen, self._domain, self._learnt)
+            check_scene(seen, self._domain, self._learnt)
         return seen
 
 
@@ -155,7 +155,7 @@ def _check_demonstrations(demonstrations: Sequence[Demonstration], domain: Domai
     for d in demonstrations:
         for number, step in enumerate(d.steps, 1):
             try:
-                check_words(step.whole, domain, learnt=False)
+                check_scene(step.whole, domain, learnt=False)
             except InputError as error:
                 raise InputError(f"demonstration {d.id}, step {number}: {error}") from error
 

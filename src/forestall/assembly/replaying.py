@@ -6,9 +6,10 @@ Nothing stops at an alarm: what was carried out is what goes on. Composition lik
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from forestall.assembly.checking import (
     Judgement,
@@ -26,6 +27,7 @@ from forestall.assembly.recorded import Opened
 from forestall.assembly.sources import scoped
 from forestall.conclusion import MonitorConfig
 from forestall.domain.model import Domain
+from forestall.errors import FileFormatError, UnknownNameError
 from forestall.kinds import PERCEIVER
 from forestall.monitor import Monitor
 from forestall.types.decision import Hold, MonitorDecision, Outcome
@@ -33,7 +35,7 @@ from forestall.types.demonstration import Demonstration
 from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillOutcome, SkillStatus
 from forestall.types.observation import Observation
 from forestall.types.plan import Plan
-from forestall.types.recorded import Look, RecordedRun
+from forestall.types.recorded import Look, ReadReport, RecordedRun, Unread
 from forestall.types.scene import SceneNeeds
 from forestall.types.task import Goal, Task
 from forestall.worlds.replay.world import ReplayWorld
@@ -117,6 +119,8 @@ class _Replay:
         outcome = _outcome(number, following, seen.time_s)
         wanted = self.run.plan.subtasks[number]
         decision = asked(self.monitor, seen, wanted)
+        if (why := dict(following.unshown).get(number)) is not None:
+            decision = _unjudged(decision, why)
         self._note(number, seen.time_s, decision, _ended(outcome))
         if decision.hold in (Hold.SENSES, Hold.INTERNAL):
             return
@@ -200,14 +204,19 @@ def replay_config(opened: Opened, given: Given) -> RunConfig:
     return run_config("", given=given.over(opened.given))
 
 
-def runs_of(opened: Opened, name: str | None) -> Iterator[RecordedRun]:
+def runs_of(
+    opened: Opened, name: str | None, report: ReadReport | None = None
+) -> Iterator[RecordedRun]:
     """Every run that can be used, or the one of a name.
 
-    Raises:
-        InputError: the run of that name cannot be used; what is unread otherwise is left out.
-    """
-    from forestall.errors import FileFormatError, UnknownNameError
+    Args:
+        opened: the data set that they are of.
+        name: of one run.
+        report: is told which runs cannot be used.
 
+    Raises:
+        InputError: the run of that name, or the only one, cannot be used.
+    """
     names = []
     for run in opened.data.runs(opened.domain):
         names.append(run.name)
@@ -217,8 +226,28 @@ def runs_of(opened: Opened, name: str | None) -> Iterator[RecordedRun]:
             yield run
         elif name is not None or len(opened.data) == 1:
             raise FileFormatError(f"{run.name}: {run.why}")
+        elif report is not None:
+            report.unread.append(run)
     if name is not None and name not in names:
         raise UnknownNameError("run", name, names)
+
+
+def judged_of(
+    opened: Opened,
+    name: str | None,
+    report: ReadReport,
+    judge: Callable[[RecordedRun], Replayed],
+) -> Iterator[Replayed]:
+    """Like `runs_of`, each run judged; one of several whose looks cannot be read is unread."""
+    for run in runs_of(opened, name, report):
+        try:
+            found = judge(run)
+        except FileFormatError as error:
+            if name is not None or len(opened.data) == 1:
+                raise
+            report.unread.append(Unread(run.name, str(error)))
+        else:
+            yield found
 
 
 def _outcome(number: int, following: Look, now_s: float) -> SkillOutcome:
@@ -230,6 +259,27 @@ def _outcome(number: int, following: Look, now_s: float) -> SkillOutcome:
         good = following.succeeded or number < following.done
         status = SkillStatus.SUCCEEDED if good else SkillStatus.FAILED
     return SkillOutcome(status, lasted_s)
+
+
+def _unjudged(decision: MonitorDecision, why: str) -> MonitorDecision:
+    """What is said of a step that nothing shows as it begins; senses that fail are told as ever."""
+    if decision.hold in (Hold.SENSES, Hold.INTERNAL):
+        return decision
+    nothing: dict[str, Any] = {"verdict": None, "diagnosis": None, "replan": None, "sentence": ""}
+    record = decision.record
+    if record is not None:
+        record = replace(record, outcome=Outcome.NOT_JUDGED, watched=(), why=why, **nothing)
+    return replace(
+        decision,
+        outcome=Outcome.NOT_JUDGED,
+        may_start=False,
+        plan=None,
+        look_at=(),
+        hold=None,
+        why=why,
+        record=record,
+        **nothing,
+    )
 
 
 def _ended(outcome: SkillOutcome) -> str:

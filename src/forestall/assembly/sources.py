@@ -31,6 +31,7 @@ from forestall.types.symbolic import scene_graph
 
 MEMORY_SUFFIXES = (".db", ".sqlite", ".sqlite3")
 RECORD_FILES = ("record.json", "boundaries.jsonl")
+_BESIDE = ("-wal", "-shm")
 WRITTEN_KEYS = ("task", "scene", "steps", "final")
 LABEL = "a person's label"
 """Where a demonstration comes from that nobody ran."""
@@ -78,6 +79,22 @@ def gathered(
         raise InputError(f"no demonstration was found in {_said(source)}")
     named = _named(found)
     return named, len(found) - len(named)
+
+
+def passed_over(sources: Iterable[Path]) -> list[Path]:
+    """What in folders of demonstrations is read as none: unknown files, and folders of no run.
+
+    Hidden things, what a memory has beside it and stored observations, of which demonstrations
+    have some, are not meant to be any.
+    """
+    return [
+        entry
+        for folder in sources
+        if folder.is_dir() and not _is_run(folder)
+        for entry in sorted(folder.iterdir())
+        if not (_shows(entry) or entry.name.startswith(".") or entry.name.endswith(_BESIDE))
+        and not (entry / OBSERVATION_FILE).is_file()
+    ]
 
 
 def scoped(
@@ -232,7 +249,7 @@ def _from_path(path: Path, eyes: Eyes | None, memories: list[Path]) -> list[Demo
             return list(store.required())
     if path.is_file() and path.suffix == ".json" and path.name not in RECORD_FILES:
         return [_from_json(path, eyes)]
-    if path.name in RECORD_FILES or any((path / name).is_file() for name in RECORD_FILES):
+    if path.name in RECORD_FILES or _is_run(path):
         found = demonstration_from(read_record(path), forestall.__version__)
         if found is None:
             raise InputError(
@@ -253,9 +270,11 @@ def _from_path(path: Path, eyes: Eyes | None, memories: list[Path]) -> list[Demo
 
 def _shows(path: Path) -> bool:
     """Whether something in a folder is meant to be read."""
-    if path.is_dir():
-        return any((path / name).is_file() for name in RECORD_FILES)
-    return path.suffix in (".json", *MEMORY_SUFFIXES)
+    return _is_run(path) if path.is_dir() else path.suffix in (".json", *MEMORY_SUFFIXES)
+
+
+def _is_run(path: Path) -> bool:
+    return any((path / name).is_file() for name in RECORD_FILES)
 
 
 def _from_json(path: Path, eyes: Eyes | None) -> Demonstration:

@@ -44,18 +44,26 @@ class Stored:
         return self.scene.time_s if isinstance(self.scene, Observation) else 0.0
 
 
-def scenes_in(paths: Iterable[Path]) -> list[Path]:
+def scenes_in(paths: Iterable[Path], of_plan: bool = False) -> list[Path]:
     """Every scene in order: those that are named, and the numbered ones in a folder that is named.
 
+    Args:
+        paths: of scenes and folders of scenes.
+        of_plan: each is of the next step of a plan, so that none may lack in a folder.
+
     Raises:
-        FileFormatError: a folder that is no observation and holds none; or no clear order.
+        FileFormatError: a folder that is no observation and holds none; no clear order; something
+            with a number that is no scene; or, of a plan, a number that no scene has.
     """
     found: list[Path] = []
     for path in paths:
         if path.name == OBSERVATION_FILE:
             found.append(path.parent)
         elif path.is_dir() and not (path / OBSERVATION_FILE).is_file():
-            found += _numbered(path)
+            numbers = _numbered(path)
+            if of_plan:
+                _whole(path, numbers, begins=not found)
+            found += [numbers[n] for n in sorted(numbers)]
         else:
             found.append(path)
     return found
@@ -82,7 +90,7 @@ def read_scene(
         return Stored(path, *read_observation(path, domain, names=names))
     graph = read_graph(path)
     try:
-        _check(graph, domain, learnt)
+        check_scene(graph, domain, learnt)
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
     return Stored(path, graph)
@@ -101,9 +109,10 @@ def read_graph(path: Path) -> SceneGraph:
         raise FileFormatError(f"{path}: {error}") from error
 
 
-def _numbered(folder: Path) -> list[Path]:
+def _numbered(folder: Path) -> dict[int, Path]:
     """The scenes of a folder by the first number in their names."""
-    entries = [p for p in sorted(folder.iterdir()) if _may_be_scene(p)]
+    shown = [p for p in sorted(folder.iterdir()) if not p.name.startswith(".")]
+    entries = [p for p in shown if _may_be_scene(p)]
     if not entries:
         raise FileFormatError(
             f"{folder} holds no {OBSERVATION_FILE}, and no observation folders or graph files "
@@ -111,21 +120,44 @@ def _numbered(folder: Path) -> list[Path]:
         )
     numbers: dict[int, Path] = {}
     for path in entries:
-        found = re.search(r"\d+", path.name)
-        if found is None:
+        number = _number(path)
+        if number is None:
             raise FileFormatError(f"{path}: a number in its name must say when it comes")
-        number = int(found[0])
         if number in numbers:
             raise FileFormatError(f"{path} has the same number as {numbers[number].name}")
         numbers[number] = path
-    return [numbers[n] for n in sorted(numbers)]
+    for path in shown:
+        number = _number(path)
+        if number is not None and number not in numbers:
+            raise FileFormatError(
+                f"{path} has a number and is no scene: a folder with {OBSERVATION_FILE} is one, "
+                f"or a graph file (step-{number}{GRAPH_SUFFIX}); what is none goes elsewhere"
+            )
+    return numbers
+
+
+def _number(path: Path) -> int | None:
+    found = re.search(r"\d+", path.name if path.is_dir() else path.stem)
+    return None if found is None else int(found[0])
+
+
+def _whole(folder: Path, numbers: Mapping[int, Path], begins: bool) -> None:
+    """See that no scene lacks: the ones behind it would be judged before other steps."""
+    least, last = min(numbers), max(numbers)
+    first = 1 if begins and least > 1 else least
+    lacking = next((n for n in range(first, last) if n not in numbers), None)
+    if lacking is not None:
+        raise FileFormatError(
+            f"{folder} has no scene with the number {lacking}: those before the steps of a plan "
+            "are numbered 1, 2, 3, ... without a gap; or name the scenes one by one"
+        )
 
 
 def _may_be_scene(path: Path) -> bool:
     return (path / OBSERVATION_FILE).is_file() if path.is_dir() else is_graph(path)
 
 
-def _check(graph: SceneGraph, domain: Domain, learnt: bool) -> None:
+def check_scene(graph: SceneGraph, domain: Domain, learnt: bool) -> None:
     """A category may be any; what is said of things must mean something in the domain."""
     within: TopologicalSorter[str] = TopologicalSorter()
     for relation in graph.relations:

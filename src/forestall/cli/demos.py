@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 DEFAULTS = SeeingFlags()
 
+MOST_TOLD = 12
+
 demos = App(name="demos", help="Record and list demonstrations.")
 
 
@@ -87,6 +89,8 @@ def record(
 def add(memory: Path, /, *sources: Path, parts: SeeingFlags = DEFAULTS) -> int:
     """Keep what shows a successful run as demonstrations; what is equal in content is kept once.
 
+    What in a folder is read as none of these is said on standard error.
+
     Args:
         memory: the demonstration file to add to; made when it does not exist.
         sources: folders of `forestall run`, every one of which must have succeeded without a
@@ -96,13 +100,22 @@ def add(memory: Path, /, *sources: Path, parts: SeeingFlags = DEFAULTS) -> int:
         parts: what pictures are seen with; they need --domain.
     """
     from forestall.assembly.eyes import eyes_for
-    from forestall.assembly.sources import gathered
+    from forestall.assembly.sources import MEMORY_SUFFIXES, gathered, passed_over
+    from forestall.cli.listing import warn
     from forestall.errors import InputError
 
     if not sources:
         raise InputError("no source was named: give the folder of at least one run, or a file")
     eyes = None if parts.domain is None else eyes_for(parts.given())
-    return _kept(memory, *gathered(sources, eyes))
+    found, there = gathered(sources, eyes)
+    known = ", ".join((".json", *MEMORY_SUFFIXES))
+    others = passed_over(sources)
+    for other in others[:MOST_TOLD]:
+        why = "no folder of a run" if other.is_dir() else f"files may be {known}"
+        warn(f"left out: {other}: {why}")
+    if len(others) > MOST_TOLD:
+        warn(f"left out: ... and {len(others) - MOST_TOLD} more")
+    return _kept(memory, found, there)
 
 
 @demos.command
@@ -126,12 +139,13 @@ def perceive(
         parts: with which parts; --domain where it is not the household.
     """
     from forestall.assembly.kept import seen_anew
+    from forestall.cli.listing import warn
     from forestall.memory.store import open_store
 
     with open_store(memory) as store:
         found, unseen = seen_anew(memory, store.required(), parts.given())
     for why in unseen:
-        print(f"left out: {why}", file=sys.stderr)
+        warn(f"left out: {why}")
     return _kept(out, found)
 
 

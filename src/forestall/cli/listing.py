@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -141,6 +142,13 @@ def say(text: object) -> None:
     from forestall.reading.printing import printable
 
     print(printable(str(text)))
+
+
+def warn(text: object) -> None:
+    """Like `say`, on standard error."""
+    from forestall.reading.printing import printable
+
+    print(printable(str(text)), file=sys.stderr)
 
 
 def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

@@ -4,8 +4,9 @@ Exit codes: 0 done, and for a run: the task succeeded; 1 the run ended and the t
 check raised an alarm; 2 what was given is not valid; 3 something else that forestall names (a
 damaged memory or model, a scene without room, a full disk, a world or a part that failed or was
 late); 4 a check that could not be judged, a run whose senses were not to be trusted; 70 a fault of
-forestall itself; 130 interrupted. Nothing but a command's own answer gives 0, 1 or 4,
-so this file imports only what cannot fail before it may catch.
+forestall itself; 130 interrupted. Nothing but a command's own answer gives 0, 1 or 4, heard or not
+(a reader of standard output that goes away changes no code), so this file imports only what cannot
+fail before it may catch.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+
+from forestall.cli.streams import heard_or_not
 
 OF_ITS_OWN = 70  # EX_SOFTWARE
 DEBUG = "--debug"
@@ -35,17 +38,17 @@ def call(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; those of the process by default. `--debug` among
             them, or FORESTALL_DEBUG=1, shows where an error comes from.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    with heard_or_not():
+        return _call(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _call(given: Sequence[str]) -> int:
     debug = DEBUG in given or os.environ.get(VARIABLE, "") not in ("", "0")
     try:
         return _answered([argument for argument in given if argument != DEBUG])
     except KeyboardInterrupt:
         return _fail("interrupted", 130)
-    except BrokenPipeError:
-        return 0
     except BaseException as error:  # noqa: BLE001 - a crash must not look like an answer
-        if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
-            return 0  # how rich says it
         if debug:
             import traceback
 
@@ -60,7 +63,8 @@ def _answered(arguments: Sequence[str]) -> int:
     from forestall.cli.app import answer
 
     code = answer(arguments)
-    sys.stdout.flush()
+    if sys.stdout is not None:
+        sys.stdout.flush()
     return code
 
 
@@ -71,7 +75,8 @@ def _told(error: BaseException) -> tuple[str, int]:
 
     if isinstance(error, InputError | PerceptionError):
         return str(error), 2
-    if isinstance(error, ForestallError | OSError):
+    named = isinstance(error, OSError) and not isinstance(error, BrokenPipeError)
+    if named or isinstance(error, ForestallError):
         return str(error), 3
     if (lacking := missed(error)) is not None:
         return lacking, 2

@@ -12,6 +12,7 @@ from forestall.cli.flags import Json, RunFlags
 
 if TYPE_CHECKING:
     from forestall.assembly.replaying import Replayed, Said
+    from forestall.types.recorded import ReadReport, RecordedRun, Unread
 
 
 DEFAULTS = RunFlags()
@@ -33,7 +34,7 @@ def replay(
     """Judge a recorded run step by step; nothing stops at an alarm.
 
     Exit code 0: nothing would have been said; 1: an alarm; 2: the input is not valid; 4: something
-    could not be judged. See docs/logs.md.
+    could not be judged: a step, or one of several runs that cannot be read. See docs/logs.md.
 
     Args:
         log: the kind of log and where it is: folder:FOLDER, lerobot:FOLDER, mcap:FILE,
@@ -50,11 +51,13 @@ def replay(
     from forestall.assembly.logs import export, showing
     from forestall.assembly.make import needs_memory
     from forestall.assembly.recorded import named_data, open_data
+    from forestall.assembly.replaying import judged_of, replay_config
     from forestall.assembly.replaying import replay as replayed
-    from forestall.assembly.replaying import replay_config, runs_of
     from forestall.cli.demos import memory_of
+    from forestall.cli.listing import warn
     from forestall.errors import InputError
     from forestall.report.page import write_page
+    from forestall.types.recorded import ReadReport
 
     given, writer = parts.given(), None if show is None else showing(show)
     shown = page is not None or writer is not None
@@ -66,26 +69,33 @@ def replay(
             raise InputError("give --memory FILE, or --strategy plan-check, which needs none")
         demonstrations, memory = memory_of(config, as_json)
     found: list[Replayed] = []
-    for one in runs_of(opened, run):
+    report = ReadReport()
+
+    def judge(one: RecordedRun) -> Replayed:
         if shown and found:
             raise InputError("--page and --log are of one run: name it with --run")
-        found.append(replayed(opened, one, demonstrations, memory, given, pictures=shown))
+        return replayed(opened, one, demonstrations, memory, given, pictures=shown)
+
+    for one in judged_of(opened, run, report, judge):
+        found.append(one)
         if not as_json:
-            _tell(found[-1])
+            _tell(one)
     if not found:
-        raise InputError(f"{log}: no run of it can be used; 'forestall import --dry-run' says why")
+        raise InputError(_none_of(log, report))
     if page is not None:
         write_page(found[0].judgements.record, page)
     if writer is not None:
         export(found[0].judgements.record, None, writer)
     if as_json:
-        print(json.dumps([_json(one) for one in found], indent=2))
+        print(json.dumps([*map(_json, found), *map(_unread_json, report.unread)], indent=2))
     elif page is not None:
         print(page)
+    for unread in report.unread:
+        warn(f"{unread.name}: not judged: {unread.why}")
     said = [j for one in found for j in one.judgements.each]
     if any(j.alarm for j in said):
         return 1
-    return 0 if all(j.judged for j in said) else 4
+    return 0 if not report.unread and all(j.judged for j in said) else 4
 
 
 def _tell(found: Replayed) -> None:
@@ -123,6 +133,26 @@ def _why(said: Said) -> str:
     return cause if said.judgement.alarm and cause else decision.why
 
 
+def _none_of(log: str, report: ReadReport) -> str:
+    """Why nothing was judged: of the first run, for example."""
+    text = f"{log}: no run of it can be used; 'forestall import --dry-run' says why"
+    return f"{text}: {one.name}: {one.why}" if (one := next(iter(report.unread), None)) else text
+
+
+def _unread_json(unread: Unread) -> dict[str, Any]:
+    """A run that cannot be used, with the same entries as one that can."""
+    return {
+        "run": unread.name,
+        "task": None,
+        "fails_at_step": None,
+        "kind": "",
+        "why": "",
+        "left_out": [],
+        "why_not": unread.why,
+        "timeline": [],
+    }
+
+
 def _json(found: Replayed) -> dict[str, Any]:
     run = found.run
     return {
@@ -132,6 +162,7 @@ def _json(found: Replayed) -> dict[str, Any]:
         "kind": run.kind,
         "why": run.why,
         "left_out": list(run.left_out),
+        "why_not": "",
         "timeline": [
             {
                 "step": s.step + 1,

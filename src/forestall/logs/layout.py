@@ -21,6 +21,10 @@ from forestall.reading.models import validated
 from forestall.types.episode import SkillStatus
 from forestall.types.plan import Subtask
 
+LOOK_AGE_S = 10.0
+"""How old a look may be in a log that says what a look is, as `supervision.Limits.max_age_s`:
+it was made for the subtask, and judging it takes its time."""
+
 Row = tuple[float, float, float, float]
 Matrix = tuple[Row, Row, Row, Row]
 Intrinsic = tuple[float, float, float, float]
@@ -115,7 +119,8 @@ class Layout(_Strict):
 
     Args:
         every_s: look so often between the boundaries of subtasks; None: at boundaries alone.
-        stale_s: what was seen longer before a boundary does not show it.
+        stale_s: what was seen longer before a boundary does not show it: a subtask that begins then
+            is not judged.
         subtasks: text in the log → subtask in the domain's words; "" for none at all.
         mcap: topics and frames.
         lerobot: columns.

@@ -20,7 +20,7 @@ from forestall.logs.layout import Columns, CsvStep, Step, read_layout, read_step
 from forestall.logs.lerobot_in import OWN, Looking
 from forestall.logs.lerobot_meta import Episode, Meta, read_episodes, read_meta
 from forestall.logs.lerobot_out import DETECTIONS, LOOK
-from forestall.logs.moments import chosen, moments_of
+from forestall.logs.moments import chosen, moments_of, notes_of
 from forestall.types.recorded import RecordedRun, Unread
 
 _SUCCESS = "next.success"
@@ -75,14 +75,16 @@ class LeRobotData:
         else:
             steps = looking.steps(rows)
         looks = sorted({row.look: row.stamp_ns for row in reversed(rows)}.values())
-        if LOOK not in rows[0].cells:
+        timed = LOOK not in rows[0].cells
+        if timed:
             looks = chosen(looks, steps, self._layout)
         about = dict(episode.about) or {"task": episode.task, "goal": episode.task}
         if "success" not in about:
             about["success"] = self._success(looking)
-        moments = moments_of(looks, steps)
+        moments = moments_of(looks, steps, self._layout.stale_s if timed else None)
         notes = [] if self._cameras[0].masks else [f"{self._cameras[0].rgb}: no masks"]
         notes += [] if self._cameras[0].depth else [f"{self._cameras[0].rgb}: no depth"]
+        notes += notes_of(moments)
         return recorded(
             name, about, steps, moments, domain, partial(looking.looks, rows, moments), notes
         )

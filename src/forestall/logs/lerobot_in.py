@@ -136,7 +136,7 @@ class Looking:
         seen = iter(self._observations(chosen))
         for moment in moments:
             observation = None if moment.at_ns is None else next(seen)
-            yield Look(observation, moment.before, moment.done, moment.succeeded)
+            yield Look(observation, moment.before, moment.done, moment.succeeded, moment.unshown)
 
     def _observations(self, rows: Sequence[Row]) -> Iterator[Observation]:
         frames: list[Frame] = []

@@ -21,7 +21,7 @@ from forestall.logs.mcap_file import McapFile
 from forestall.logs.mcap_in import Looking
 from forestall.logs.mcap_index import Index, index_of
 from forestall.logs.mcap_out import ABOUT
-from forestall.logs.moments import unseen
+from forestall.logs.moments import notes_of
 from forestall.types.recorded import Look, RecordedRun, Unread
 
 _EPOCH_S = 1e8
@@ -79,8 +79,8 @@ class McapLogs:
                 steps = _from_csv(self._steps, index, self._where)
             looking = Looking(index, cameras, steps)
             about = file.about.get(ABOUT, {})
-            notes = [*index.notes, *_lacks(looking)]
             moments = looking.moments()
+            notes = [*index.notes, *_lacks(looking), *notes_of(moments)]
         return recorded(path.stem, about, steps, moments, domain, partial(_looks, looking), notes)
 
 
@@ -97,8 +97,6 @@ def _lacks(looking: Looking) -> Iterator[str]:
             yield f"{camera.rgb}: no depth that is aligned to it, so that nothing is located"
         if not camera.masks and camera.detections is None:
             yield f"{camera.rgb}: no masks and no detections; name a segmenter to have some"
-    if not looking.whole:
-        yield from unseen(looking.stamps_ns, looking.steps, looking.index.layout)
 
 
 def _from_csv(rows: list[CsvStep], index: Index, where: str) -> list[Step]:

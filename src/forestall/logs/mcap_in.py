@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from forestall.errors import FileFormatError, ForestallError, InputError
-from forestall.logs.layout import Step, Topics
+from forestall.logs.layout import LOOK_AGE_S, Step, Topics
 from forestall.logs.mcap_index import Index
 from forestall.logs.mcap_out import COLOUR
 from forestall.logs.moments import Moment, chosen, moments_of
@@ -61,8 +61,9 @@ class Looking:
     def moments(self) -> list[Moment]:
         """Every look, with the subtasks between them."""
         if self.whole:
-            return moments_of(sorted(self.index.looks), self.steps)
-        return moments_of(chosen(self.stamps_ns, self.steps, self.index.layout), self.steps)
+            return moments_of(sorted(self.index.looks), self.steps, LOOK_AGE_S)
+        layout = self.index.layout
+        return moments_of(chosen(self.stamps_ns, self.steps, layout), self.steps, layout.stale_s)
 
     def looks(self) -> Iterator[Look]:
         """Each look with its pictures.
@@ -75,7 +76,7 @@ class Looking:
             seen = None
             if at is not None:
                 seen = self._look(at) if self.whole else self._seen(at)
-            yield Look(seen, moment.before, moment.done, moment.succeeded)
+            yield Look(seen, moment.before, moment.done, moment.succeeded, moment.unshown)
 
     def _look(self, stamp_ns: int) -> Observation:
         """One of our own looks, as it was."""

@@ -7,13 +7,13 @@ Used by the readers of graphs, records and memories; calls nothing. What is wron
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
 from typing import Any, NoReturn, TypeVar
 
-from forestall.errors import FileFormatError, ForestallError
+from forestall.errors import FileFormatError, ForestallError, UnknownNameError
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
@@ -55,6 +55,20 @@ class Field:
         if key not in self.value:
             return None
         return Field(self.value[key], f"{self.place}.{key}" if self.place else key)
+
+    def only(self, known: Collection[str], kind: str = "entry") -> Field:
+        """Itself, an object without any key but these.
+
+        Raises:
+            FileFormatError: another key, with the nearest one that is known.
+        """
+        if not isinstance(self.value, dict):
+            self.fail("an object")
+        for key in self.value:
+            if key not in known:
+                error = UnknownNameError(kind, str(key), known)
+                raise FileFormatError(f"{self.place}: {error}" if self.place else str(error))
+        return self
 
     def maybe(self, key: str, read: Callable[[Field], T]) -> T | None:
         """What is under a key, None where that is null."""

@@ -10,7 +10,7 @@ import base64
 import math
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -124,6 +124,9 @@ class Relation:
     def __str__(self) -> str:
         return f"{self.subject} {self.predicate.replace('_', ' ')} {self.object}"
 
+
+_OF_A_NODE = tuple(f.name for f in fields(ObjectNode))
+"""The keys of a node in JSON, as `_node_json` writes them."""
 
 _IN_ORDER = attrgetter("subject", "predicate", "object")
 
@@ -253,7 +256,8 @@ class SceneGraph:
         """Read what `to_json` wrote.
 
         Raises:
-            FileFormatError: not a scene graph, another format version, or a broken field.
+            FileFormatError: not a scene graph, another format version, a broken field, or one that
+                no graph has.
             InputError: a dangling relation, or an id twice.
         """
         field = Field(data)
@@ -263,7 +267,8 @@ class SceneGraph:
             raise FileFormatError(
                 f"scene graph format {data.get('format')!r}: this version reads {GRAPH_FORMAT}"
             )
-        nodes = field["nodes"].at_most(MOST_NODES, node_from)
+        field.only(("format", *(f.name for f in fields(cls))), "entry of a scene graph")
+        nodes = field["nodes"].at_most(MOST_NODES, lambda f: node_from(f.only(_OF_A_NODE)))
         relations = field.optional("relations", lambda f: f.at_most(MOST_RELATIONS, relation_from))
         return cls(
             nodes=nodes,

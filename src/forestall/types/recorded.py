@@ -22,12 +22,15 @@ class Look:
             then is what they started on. Of the first look itself where there was none earlier.
         done: step of the plan that this look shows done, None for a look on the way.
         succeeded: whether whoever carried that step out took it for done.
+        unshown: of the steps before, those that no look shows as they begin, and why: what was seen
+            is too old, or of later.
     """
 
     observation: Observation | None
     before: tuple[int, ...] = ()
     done: int | None = None
     succeeded: bool = True
+    unshown: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
