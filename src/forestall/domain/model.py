@@ -139,8 +139,7 @@ class Domain:
         """Whether a category or instance name counts as a tag, category or attribute holder."""
         if kind is None:
             return True
-        own = self._kinds.get(name)  # of a category's own name, as it nearly always is
-        return kind in (own or self.kinds(category_of(self.canonical(name))))
+        return kind in (self._kinds.get(name) or self.kinds(category_of(self.canonical(name))))
 
     def known_kind(self, kind: str) -> bool:
         """Whether a kind means anything in this domain."""
