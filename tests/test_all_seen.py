@@ -1,81 +1,12 @@
-"""Strategies in development kitchens in which everything that is not shut in is seen as it is.
-
-What is lost here is lost by judging and planning, and not by perception: the truth is handed on as
-the scene graph of every look, without what is shut in and without what no camera sees.
-"""
+"""What judging and planning lost where everything is seen as it is (`all_seen.py`)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 import pytest
 
-from forestall.assembly.configuration import Given, run_config
-from forestall.assembly.make import prepare, run_episode
-from forestall.domain.load import shipped
-from forestall.domain.truth import is_shut
-from forestall.statistics.cases import SPLITS, room
-from forestall.tasks.files import load_scenario
+from all_seen import run
 from forestall.types.decision import Outcome
 from forestall.types.episode import EpisodeRecord
-from forestall.types.facts import Truth
-from forestall.types.graph import SceneGraph, Seen
-from forestall.types.observation import Observation
-from forestall.worlds.kitchen.environment import KitchenEnvironment
-
-DOMAIN = shipped("household")
-
-
-def open_to_view(graph: SceneGraph) -> SceneGraph:
-    """What a camera that misses nothing would tell."""
-    shut = {
-        n.id
-        for n in graph.nodes
-        if DOMAIN.encloses(n.category) and is_shut(DOMAIN, n.category, dict(n.states)) is Truth.TRUE
-    }
-    inside, pending = set[str](), shut
-    while pending:
-        within = {r.subject for r in graph.relations if r.object in pending}
-        pending = {n for n in within if graph.parents(n, DOMAIN.containing)} - inside
-        inside |= pending
-    nodes = [
-        replace(
-            n,
-            states=tuple((a, v if DOMAIN.attributes[a].camera else None) for a, v in n.states),
-            seen=Seen.VISIBLE,
-        )
-        for n in graph.nodes
-        if n.id not in inside
-    ]
-    relations = [r for r in graph.relations if not {r.subject, r.object} & inside]
-    return SceneGraph(tuple(nodes), tuple(relations), None, tuple(shut))
-
-
-@pytest.fixture(autouse=True)
-def everything_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    def look(self: Any, *_: Any, **__: Any) -> Observation:
-        household = self._acting.household
-        return Observation(
-            (),
-            self._gripper(),
-            household.time_s,
-            robot_position_world_m=self._stage.robot_position_world_m,
-            graph=open_to_view(household.truth()),
-        )
-
-    monkeypatch.setattr(KitchenEnvironment, "scan", look)
-    monkeypatch.setattr(KitchenEnvironment, "observe", look)
-
-
-def run(scenario: str, place: int) -> EpisodeRecord:
-    """A run with the plan check in one of the development rooms."""
-    given = {"strategy": "plan-check", "perceiver": "given-graph", "world.profile": "kind"}
-    task = load_scenario(scenario).task
-    config = run_config(
-        task, scenario, seed=room(SPLITS["development"], place), given=Given.named(given)
-    )
-    return run_episode(prepare(config), ())
 
 
 def did(record: EpisodeRecord, skill: str) -> bool:
