@@ -16,6 +16,8 @@ def test_one_look_is_not_believed_again_after_something_was_done() -> None:
     senses.check(OBSERVATION)
     senses.check(OBSERVATION)  # looking again, with nothing done
     senses.done(has_effect=False)
+    senses.check(OBSERVATION)  # a drive to where the robot is takes no time and changes nothing
+    senses.done(has_effect=True)
     with pytest.raises(ObservationError, match="look anew after each"):
         senses.check(OBSERVATION)
     again = replace(OBSERVATION, frames=(replace(OBSERVATION.frames[0]),))

@@ -35,7 +35,7 @@ class Senses:
     def done(self, has_effect: bool) -> None:
         """The robot reports a subtask as done; by the rules it changes something or not."""
         self._done += 1
-        self._since += 1
+        self._since += has_effect
         self._effects += has_effect
 
     def check(self, observation: Observation | SceneGraph) -> None:
