@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from forestall import Monitor
 from forestall.domain.load import shipped
 from forestall.errors import InputError
 from forestall.perception.config import ScopeConfig
+from forestall.perception.relations import DIRECTIONS
 from forestall.perception.scope import scope
 from forestall.types.decision import Outcome
 from forestall.types.plan import Subtask
@@ -77,3 +79,13 @@ def test_a_relation_of_an_argument_that_nobody_knows_stays_in_scope() -> None:
     assert cut.get("Bowl-1") is not None
     plain = scene_graph(kitchen())
     assert scope(plain, Subtask.parse(STEP), shipped(DOMAIN), ScopeConfig()).get("Bowl-1") is None
+
+
+def test_directions_that_cameras_tell_are_no_words_that_a_domain_must_have() -> None:
+    """Perception tells of every pair what is near and to the left, whether a domain asks or not."""
+    household = shipped("household")
+    few = {name: p for name, p in household.predicates.items() if name not in DIRECTIONS}
+    told = kitchen(["Plate-1 near Microwave-1", "Plate-1 behind Bowl-1"])
+    shown = [[(STEP, told), told] for _ in range(4)]
+    made = Monitor.from_demonstrations(shown, replace(household, predicates=few))
+    assert made.check(told, STEP).outcome is Outcome.PROCEED

@@ -15,6 +15,7 @@ from forestall.domain.model import Domain
 from forestall.domain.words import Names
 from forestall.errors import FileFormatError, InputError, UnknownNameError
 from forestall.perception.folder import OBSERVATION_FILE, read_observation
+from forestall.perception.relations import DIRECTIONS
 from forestall.reading.documents import read_json
 from forestall.types.facts import category_of
 from forestall.types.graph import ObjectNode, SceneGraph
@@ -161,7 +162,8 @@ def check_scene(graph: SceneGraph, domain: Domain, learnt: bool) -> None:
     """A category may be any; what is said of things must mean something in the domain."""
     within: TopologicalSorter[str] = TopologicalSorter()
     for relation in graph.relations:
-        if relation.predicate not in domain.relations and not learnt:
+        known = relation.predicate in domain.relations or relation.predicate in DIRECTIONS
+        if not known and not learnt:
             raise UnknownNameError("relation", relation.predicate, domain.relations)
         if relation.predicate in domain.containing:
             within.add(relation.subject, relation.object)

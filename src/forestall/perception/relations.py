@@ -22,6 +22,9 @@ FRAME_NAME = "camera of the newest view, levelled"
 _FEW = 96
 _ALONG = (("right_of", "left_of"), ("behind", "in_front_of"), ("above", "below"))
 
+DIRECTIONS = frozenset(("near", *(name for pair in _ALONG for name in pair)))
+"""What is told of every pair by geometry alone, also where a domain has no word for it."""
+
 
 def levelled_axes(camera_to_world: Pose) -> Points:
     """(3, 3) rows: right, away and up of the camera, turned so that up is the world's up."""

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Set
 from forestall.domain.counted import counted
 from forestall.domain.model import Domain
 from forestall.perception.config import ScopeConfig
+from forestall.perception.relations import DIRECTIONS
 from forestall.types.facts import category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.plan import Subtask
@@ -41,7 +42,8 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
         if r.predicate == domain.roles.blocking and r.object in arguments
     }
     kept |= _devices(graph, arguments | _direct(graph, arguments, domain), domain)
-    strange = [r for r in graph.relations if r.predicate not in domain.relations]
+    known = {*domain.relations, *DIRECTIONS}
+    strange = [r for r in graph.relations if r.predicate not in known]
     pairs = [{r.subject, r.object} for r in strange]
     kept |= {name for pair in pairs if pair & arguments for name in pair}
     nodes = tuple(n for n in graph.nodes if n.id in kept)
