@@ -56,7 +56,7 @@ def test_nothing_finished_is_lost_or_doubled(
             now = victim.finished(folder)
             assert done <= now, f"lost: {sorted(done - now)}"
             done = now
-            if not killed:
+            if not killed or now == whole:  # of two one may have come to the end
                 break
         code, said = victim.start(folder).end()
         assert code == 0, said
