@@ -113,22 +113,23 @@ def by_demonstrations(of: Watches, found: Mapping[str, Metrics]) -> dict[str, li
     told = Counter(r.demonstrations for r in of.rows)
     usual = min(told, key=lambda d: (-told[d], d)) if told else PLAIN
     plain = int(first) if (first := usual.split()[0]).isdigit() else int(PLAIN)
-    curves: dict[str, list[dict[str, Any]]] = {}
+    curves: dict[str, dict[int, dict[str, Any]]] = {}
     for name in of.names:
         judge, count = demonstrations_of(name, plain)
         metrics = found[name]
         end = next(iter(suffixes(name)))
-        curves.setdefault(judge, []).append(
-            {
-                "judge": name,
-                "demonstrations": count,
-                "auroc_in_time": metrics[f"auroc_in_time_{ALL}"],
-                "in_time": metrics[f"in_time{end}"],
-                "false_alarms_per_boundary": metrics[f"false_alarms_per_boundary_{ALL}" + end],
-            }
-        )
+        points = curves.setdefault(judge, {})
+        if count in points and name != judge:  # the same, asked with as many as there are
+            continue
+        points[count] = {
+            "judge": name,
+            "demonstrations": count,
+            "auroc_in_time": metrics[f"auroc_in_time_{ALL}"],
+            "in_time": metrics[f"in_time{end}"],
+            "false_alarms_per_boundary": metrics[f"false_alarms_per_boundary_{ALL}" + end],
+        }
     return {
-        judge: sorted(points, key=lambda p: p["demonstrations"])
+        judge: [points[count] for count in sorted(points)]
         for judge, points in curves.items()
         if len(points) > 1
     }
