@@ -6,11 +6,6 @@ import pytest
 
 from all_seen import run
 from forestall.types.decision import Outcome
-from forestall.types.episode import EpisodeRecord
-
-
-def did(record: EpisodeRecord, skill: str) -> bool:
-    return any(e.subtask.skill == skill for e in record.executed)
 
 
 @pytest.mark.parametrize(("task", "place"), [("cook-egg", 7), ("store-egg", 3)])
@@ -33,26 +28,21 @@ def test_going_to_look_is_no_fault_for_a_plan_that_is_wrong_anyhow() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "place"), [("robofail-boil-water-8", 7), ("robofail-heat-potato-8", 7)]
+    ("scenario", "place", "needs"),
+    [
+        ("robofail-boil-water-8", 7, "put_in"),  # a burner that does not take a bowl
+        ("robofail-heat-potato-8", 7, "put_in"),  # a microwave that does not take a pan
+        ("irreversible-cook-egg-10-instead", 9, "crack_obj"),  # no egg was seen, none is cracked
+        ("robofail-cook-egg-6", 5, "crack_obj"),
+    ],
 )
-def test_where_no_fact_would_help_something_else_is_planned_for_the_goal(
-    scenario: str, place: int
+def test_what_a_wrong_plan_leaves_out_is_planned_for_the_goal(
+    scenario: str, place: int, needs: str
 ) -> None:
-    """A burner that does not take a bowl, a microwave that does not take a pan."""
+    """No fact would help the plan, or what it needs has yet to be made of what nobody has seen."""
     record = run(scenario, place)
     assert record.success, record.failures
-
-
-@pytest.mark.parametrize(
-    ("scenario", "place"), [("irreversible-cook-egg-10-instead", 9), ("robofail-cook-egg-6", 5)]
-)
-def test_what_is_yet_to_be_made_is_looked_for_as_what_it_is_made_of(
-    scenario: str, place: int
-) -> None:
-    """The plan cracks no egg; nobody has seen one, and it is in the shut fridge."""
-    record = run(scenario, place)
-    assert record.success, record.failures
-    assert did(record, "crack_obj")
+    assert any(e.subtask.skill == needs for e in record.executed)
 
 
 @pytest.mark.parametrize("task", ["make-coffee", "make-salad", "boil-water"])

@@ -55,7 +55,7 @@ class Senses:
                 raise ObservationError("nothing at all is seen: neither a picture nor a thing")
             if self._since and self._last is not None and _the_same(self._last, observation):
                 raise ObservationError(
-                    "this is the very observation from before a subtask that was reported as done: "
+                    "this is the very observation from before a subtask that is reported as done: "
                     "look anew after each"
                 )
             self._last, self._since = observation, 0

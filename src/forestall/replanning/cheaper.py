@@ -98,7 +98,8 @@ def less_of_time(one: Replan, other: Replan | None, state: State, start: Spot | 
     """
     if one.plan is None or other is None or other.plan is None:
         return one
-    one_s, other_s = (cost_s(run(state, r.plan.subtasks), start) for r in (one, other) if r.plan)
+    one_s = cost_s(run(state, one.plan.subtasks), start)
+    other_s = cost_s(run(state, other.plan.subtasks), start)
     return other if other_s < one_s - WORTH_S else one
 
 

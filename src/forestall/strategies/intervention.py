@@ -202,8 +202,8 @@ class Intervention:
     ) -> StrategyAnswer:
         """Replan for what must change; `context.index` is where the plan at hand would go on."""
         if diagnosis.refusal and not diagnosis.found:  # no fact would help: something else is done
-            aim = self._validator.check(Plan(()), context.graph, context.task.goal)
-            diagnosis = replace(diagnosis, must_change=aim.unmet)
+            _, missed = self.check_goal(context, clock)
+            diagnosis = replace(diagnosis, must_change=missed.must_change)
         if not diagnosis.found:
             replan = Replan(ReplanOutcome.NOTHING_TO_CHANGE, producer=self._replanner.name)
             why = f"no cause was found: {diagnosis.cause}"
