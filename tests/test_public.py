@@ -67,6 +67,22 @@ def test_twenty_scenes_in_a_strangers_words(
     assert said in str(decision)
 
 
+@pytest.mark.parametrize("strategy", ["proactive", "plan-check"])
+def test_words_that_nobody_knows_are_not_passed_over(strategy: str) -> None:
+    monitor = Monitor.from_demonstrations(TWELVE, strategy=strategy)
+    assert monitor.check(scene("hand"), INSERT).may_start
+    sealed = scene("hand")
+    sealed["objects"]["hole-1"]["seal"] = "glued"
+    for seen, word in (
+        (scene("hand", relations=["tray-1 covers hole-1"]), "covers"),
+        (sealed, "the attribute seal"),
+    ):
+        decision = monitor.check(seen, INSERT)
+        assert decision.outcome is Outcome.NOT_JUDGED and word in str(decision)
+    elsewhere = scene("hand", relations=["tray-1 covers lid-1"])
+    assert monitor.check(elsewhere, INSERT).may_start, "no argument of the subtask"
+
+
 def test_a_corrected_plan_in_a_strangers_words() -> None:
     decision = MONITOR.check(scene(), INSERT)
     assert decision.plan is not None

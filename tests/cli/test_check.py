@@ -112,13 +112,24 @@ def test_what_was_not_seen_never_proceeds_whatever_the_score_is(
     memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     gone = written(tmp_path / "gone", MUG)
-    asked = ["--subtask", STEP, "--memory", str(memory), "--threshold", "0.1"]
-    code, told = checked(capsys, [gone], *asked)
+    asked = ["--subtask", STEP, "--memory", str(memory)]
+    score = ["--detector", "scene-graph", "--threshold", "0.1"]
+    code, told = checked(capsys, [gone], *asked, *score)
     assert (code, told["outcome"]) == (4, "look")
     assert told["scenes"][0]["verdict"]["decision"] == "proceed"
     assert told["scenes"][0]["why"] == "not located: Plate"
     code, told = checked(capsys, [gone], "--subtask", "open_obj(Fridge)", "--memory", str(memory))
     assert code == 4 and told["scenes"][0]["verdict"]["score"] is None
+
+
+def test_a_state_that_nobody_read_is_not_taken_for_good(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_observation(tmp_path / "unread", seen(PLATE, MUG), {"Mug-1": {"dirty": "clean"}})
+    asked = ["--subtask", STEP, "--memory", str(memory)]
+    code, told = checked(capsys, [tmp_path / "unread"], *asked)
+    assert (code, told["outcome"]) == (4, "not judged")
+    assert "dirty(Plate-1)" in told["scenes"][0]["why"]
 
 
 def test_a_sequence_is_judged_before_the_subtasks_of_a_plan(
@@ -268,6 +279,9 @@ def test_graphs_of_another_domain_are_judged_along_a_plan(
     more = ["--memory", str(bench / "bench.db"), "--page", str(page)]
     code, told = checked(capsys, [bench / "graphs"], *asked, *more)
     assert (code, told["domain"]) == (1, "bench")
+    assert all("dirty" in s["cause"] for s in told["scenes"]), "what is needed later is seen early"
+    more += ["--detector", "scene-graph"]
+    code, told = checked(capsys, [bench / "graphs"], *asked, *more)
     *fine, last = told["scenes"]
     assert [s["outcome"] for s in fine] == ["proceed", "proceed"]
     assert last["outcome"] == "replan" and "dirty" in last["cause"]
@@ -402,8 +416,7 @@ def test_what_only_a_task_asks_is_judged_by_the_only_one_there_is_and_else_named
 ) -> None:
     dirty = written(tmp_path / "dirty", PLATE, MUG, Plate_1={"dirty": "dirty"})
     asked = ["--subtask", STEP, "--memory", str(memory)]
-    needs = ["--detector", "preconditions"]
-    code, told = checked(capsys, [dirty], *asked, *needs)
+    code, told = checked(capsys, [dirty], *asked)
     assert (code, told["outcome"], told["task"]) == (1, "hold", "clear-up")
     assert call(["check", str(dirty), *asked]) == 1
     assert "judged as the task clear-up, the only one of" in capsys.readouterr().err
@@ -413,17 +426,17 @@ def test_what_only_a_task_asks_is_judged_by_the_only_one_there_is_and_else_named
             other.add(d)
             other.add(replace(d, task="lay-table", id=f"{d.id}-again"))
     asked = ["--subtask", STEP, "--memory", str(two)]
-    code, told = checked(capsys, [dirty], *asked, *needs)
+    code, told = checked(capsys, [dirty], *asked)
     assert (code, told["outcome"], told["task"]) == (0, "proceed", None)
     unjudged = (
         "not judged, because it depends on the task and no task is named (--task): "
         "dirty(Plate-1)=clean, as in clear-up and lay-table"
     )
     assert told["scenes"][0]["why"] == unjudged
-    code, told = checked(capsys, [dirty], *asked)
+    code, told = checked(capsys, [dirty], *asked, "--detector", "scene-graph")
     assert code == 1 and told["scenes"][0]["cause"].startswith(
         "nothing is violated that the demonstrations show to matter before pick_up; " + unjudged
     )
     fine = written(tmp_path / "fine", PLATE, MUG)
-    code, told = checked(capsys, [fine], *asked, *needs)
+    code, told = checked(capsys, [fine], *asked)
     assert (code, told["scenes"][0]["why"]) == (0, "")

@@ -16,6 +16,7 @@ from typing import Any
 from forestall.assembly.configuration import Given, RunConfig, digest_of, run_config
 from forestall.assembly.corrections import described, remembering
 from forestall.assembly.make import STORED_STATES, provenance
+from forestall.assembly.monitor import DEFAULTS
 from forestall.assembly.other_eyes import other_eyes
 from forestall.assembly.own_domain import domain_of_demonstrations
 from forestall.assembly.parts import Assembly
@@ -209,13 +210,14 @@ def _read(
 
 
 def _config(question: Question, given: Given, graphs: bool) -> RunConfig:
-    """What a stored scene brings with it, its masks and states, and over it what was said."""
+    """What was said, over what a stored scene brings with it, over what any `Monitor` has."""
     own = {
         "segmenter": "given-masks",
         "states": STORED_STATES,
         "perceiver": "given-graph" if graphs else "graph",
     }
-    config = run_config(question.task or "", given=given.over(Given.named(own)))
+    own_over_usual = given.over(Given.named(own)).over(DEFAULTS)
+    config = run_config(question.task or "", given=own_over_usual)
     if config.choice(STATES).name == TRUTH_STATES:
         readable = [n for n in known(STATES.name) if n != TRUTH_STATES]
         raise UnknownNameError("states of a stored observation", TRUTH_STATES, readable)

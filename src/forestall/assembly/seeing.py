@@ -175,11 +175,13 @@ def graph(
 def given_graph(parts: Parts, *, scope: ScopeConfig | None = None) -> GraphPassthrough:
     """The scene graph that an observation comes with.
 
+    A state that it leaves open is presumed to be what the robot's skills should have made of it.
+
     Args:
         parts: the domain.
         scope: what concerns a subtask.
     """
-    return GraphPassthrough(parts.domain, scope)
+    return GraphPassthrough(parts.domain, scope, alters=partial(altered, domain=parts.domain))
 
 
 def look_encoder(parts: Parts) -> ImageTextEncoder:

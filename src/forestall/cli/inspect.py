@@ -105,7 +105,7 @@ def check(
         memory: a demonstration file; the ready-made one of the task by default.
         domain: what everything is read in: a name, or a file (.toml, .pddl); by default the task's,
             else one that has the skills of the memory, else one that is learnt from it.
-        detector: what judges: scene-graph (by default), preconditions, objects, caption, image.
+        detector: what judges: preconditions (by default), scene-graph, objects, caption, image.
         threshold: alarm when no demonstration reaches this score.
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.

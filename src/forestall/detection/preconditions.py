@@ -21,6 +21,7 @@ from forestall.comparison.preconditions import MiningConfig, mine, needed, viola
 from forestall.comparison.relevance import counts
 from forestall.comparison.unasked import Unasked, not_judged, unasked
 from forestall.detection.scene_graph import NO_REFERENCE, drawn, rarity
+from forestall.domain.asked import not_understood
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.seams.judging import Expectations
@@ -199,7 +200,7 @@ class PreconditionDetector:
             verdict = self._verdict(Decision.REPLAN, score, references, note, facts)
             return replace(verdict, expected_by=max(false, key=weight).precondition.expected_by)
         unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
-        strange = self._strange(observed, subtask)
+        strange = not_understood(observed, subtask, self._domain)
         if unseen or strange:
             seen_not = [_listed("not observed", unseen)] if unseen else []
             note = "; ".join([*strange, *seen_not])
@@ -211,23 +212,6 @@ class PreconditionDetector:
         by = " and ".join(models)
         note = f"no demonstration of it; it is as the language model {by} expects"
         return replace(self._verdict(Decision.PROCEED, score, references, note), expected_by=by)
-
-    def _strange(self, observed: SceneGraph, subtask: Subtask) -> list[str]:
-        """What is said of an argument in words that the domain lacks: it may matter or not."""
-        about = {name for a in subtask.args for name in observed.matches(a)}
-        relations = [
-            f"{r}: nothing is known of the relation {r.predicate}, so it may matter"
-            for r in observed.relations
-            if r.predicate not in self._domain.relations
-            and (r.subject in about or r.object in about)
-        ]
-        attributes = [
-            f"{n.id}: nothing is known of the attribute {attribute}, so it may matter"
-            for n in observed.nodes
-            for attribute, _ in (n.states if n.id in about else ())
-            if attribute not in self._domain.attributes
-        ]
-        return relations + attributes
 
     def _not_judged(
         self,

@@ -1,4 +1,4 @@
-"""Which facts decide whether a subtask can start, of those that nobody saw.
+"""Which facts decide whether a subtask can start, of those that nobody saw or can read.
 
 Called by strategies, which do not let a robot start on what nobody saw; calls `truth`.
 """
@@ -42,3 +42,24 @@ def is_asked(fact: Literal, asked: frozenset[Literal]) -> bool:
         and all(a.startswith("?") or a == b for a, b in zip(x.args, fact.args, strict=True))
         for x in asked
     )
+
+
+def not_understood(graph: SceneGraph, subtask: Subtask, domain: Domain) -> list[str]:
+    """What a graph says of a subtask's arguments in words that the domain lacks, a sentence each.
+
+    It may matter or not: nobody can say. A domain that was learnt has no words but those of its
+    demonstrations.
+    """
+    about = {name for a in subtask.args for name in graph.matches(a)}
+    relations = [
+        f"{r}: nothing is known of the relation {r.predicate}, so it may matter"
+        for r in graph.relations
+        if r.predicate not in domain.relations and (r.subject in about or r.object in about)
+    ]
+    attributes = [
+        f"{n.id}: nothing is known of the attribute {attribute}, so it may matter"
+        for n in graph.nodes
+        for attribute, _ in (n.states if n.id in about else ())
+        if attribute not in domain.attributes
+    ]
+    return relations + attributes

@@ -7,7 +7,7 @@ each frame and `fuse.py` once for each observation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from forestall.domain.model import Domain
@@ -35,12 +35,13 @@ from forestall.perception.unproject import (
 )
 from forestall.perception.vantage import best_vantage
 from forestall.seams.perceiving import (
+    Alters,
     ConfidentStateEstimator,
     ImageEncoder,
     Segmenter,
     StateEstimator,
 )
-from forestall.types.facts import Change, category_of
+from forestall.types.facts import category_of
 from forestall.types.feature import quantised
 from forestall.types.finding import Finding, refuse
 from forestall.types.graph import SceneGraph
@@ -48,9 +49,6 @@ from forestall.types.observation import Detection, Frame, Observation, Vec3
 from forestall.types.plan import Subtask
 
 _GATE = GateConfig()
-
-Alters = Callable[[SceneGraph, Subtask], Iterable[Change]]
-"""What is believed, what was carried out → what that may have changed."""
 
 
 class GraphPerceiver:

@@ -50,7 +50,7 @@ def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[Change
         + tuple(
             Change(node.id, attribute, old, new)
             for node in graph.nodes
-            for attribute, _ in node.states
+            for attribute in sorted(domain.attributes)
             if (old := before.value(node.id, attribute)) is not None
             and (new := after.value(node.id, attribute)) is not None
             and old != new

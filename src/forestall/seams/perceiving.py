@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from forestall.types.encoder import StateReading
+from forestall.types.facts import Change
 from forestall.types.graph import SceneGraph
 from forestall.types.grounding import Corners, GroundedBox
 from forestall.types.observation import Detection, Frame, Mask, Observation, Rgb
 from forestall.types.plan import Subtask
+
+Alters = Callable[[SceneGraph, Subtask], Iterable[Change]]
+"""What is believed, what was carried out → what that may have changed."""
 
 
 class Segmenter(Protocol):

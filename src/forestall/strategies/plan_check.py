@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from forestall.domain.asked import not_understood
 from forestall.seams.judging import PlanValidator, Replanner
 from forestall.strategies.intervention import (
     PLAN_CHECK,
@@ -29,7 +30,8 @@ _GO_ON = StrategyAnswer(Decision.PROCEED)
 class PlanChecking:
     """Executes the rest of the plan on the observed graph before each subtask.
 
-    - it runs and reaches the goal: proceed, unless what the next subtask relies on was not seen;
+    - it runs and reaches the goal: proceed, unless what the next subtask relies on was not seen, or
+      something is said of its arguments that the domain has no word for;
     - it does not: another look, then an alarm and a plan from what is seen.
 
     Args:
@@ -69,6 +71,9 @@ class PlanChecking:
             why = f"not observed: {', '.join(unseen)}"
             found = self._intervention.look_for(context, verdict, clock)
             return found or look_again(replace(verdict, note=why), clock, why)
+        if strange := not_understood(context.scoped, context.subtask, domain):
+            why = "; ".join(strange)
+            return look_again(replace(verdict, note=why), clock, why)
         return StrategyAnswer(Decision.PROCEED, verdict, seconds=clock.items())
 
     def after_subtask(self, context: BoundaryContext, outcome: SkillOutcome) -> StrategyAnswer:
