@@ -189,6 +189,15 @@ def test_a_step_that_no_picture_shows_as_it_begins_is_not_judged(
     assert early == "step 1 begins 2.0 s before the first picture"
     assert late.startswith("step 3 begins 60.0 s after the last picture before it: at most 10 s")
     assert left_out == [early, late]
+    as_demonstration = ["import", "mcap", str(log), "--steps", str(steps), "--json"]
+    call([*as_demonstration[:3], str(tmp_path / "stale"), *as_demonstration[3:]])
+    report = json.loads(capsys.readouterr().out)
+    assert report["good"] == 0 and report["why_not"][0]["why"].startswith(early)
+    call([*as_demonstration[:3], "--dry-run", *as_demonstration[3:]])
+    assert early in json.loads(capsys.readouterr().out)[0]["why_not"]
+    told(0.5, 12.5)
+    call([*as_demonstration[:3], str(tmp_path / "shown"), *as_demonstration[3:]])
+    assert json.loads(capsys.readouterr().out)["good"] == 1
 
 
 def test_of_pictures_none_that_is_stale_shows_a_step() -> None:

@@ -36,7 +36,7 @@ from forestall.types.foreign import ForeignRun
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Frame, Observation
 from forestall.types.plan import Subtask
-from forestall.types.recorded import ReadReport, RecordedRun, Unread
+from forestall.types.recorded import Look, ReadReport, RecordedRun, Unread
 
 FAILED = "failed"
 """What makes a run fail of which nobody says it."""
@@ -243,6 +243,7 @@ def _outline(run: RecordedRun) -> Outline:
     looks, last_s = 0, 0.0
     for look in run.looks():
         for number in look.before:
+            _must_show(look, number)
             steps[number] = OutlinedStep(last_s, str(run.plan.subtasks[number]), "")
         if look.done is not None:
             ended = "succeeded" if look.succeeded else FAILED
@@ -308,6 +309,7 @@ def _seen(recorded: RecordedRun, eyes: Eyes, notes: list[str]) -> SeenRun:
         for number in look.before:
             if graph is None:
                 raise InputError(f"nothing that can be believed was seen before step {number + 1}")
+            _must_show(look, number)
             step, concerns = eyes.step(plan[number], graph)
             meant.append(step)
             scenes.append(graph)
@@ -318,6 +320,12 @@ def _seen(recorded: RecordedRun, eyes: Eyes, notes: list[str]) -> SeenRun:
             graph = _look(eyes, look.observation, graph, refused)
     notes += [f"{n} looks: {why}" for why, n in refused.items()]
     return SeenRun(recorded, _run(recorded, scenes, scoped, graph))
+
+
+def _must_show(look: Look, number: int) -> None:
+    """What somebody saw at another time is not how a step began."""
+    if (why := dict(look.unshown).get(number)) is not None:
+        raise InputError(f"{why}: nothing shows how it began")
 
 
 def _look(
