@@ -94,13 +94,13 @@ class Description:
 
 
 def _reading(field: Field) -> StateReading:
-    scale, divisor, least, area, contrast = (f.name for f in fields(StateReading))
+    scale, divisor, least, area, rough = (f.name for f in fields(StateReading))
     found = StateReading(
         field[scale].number(),
         *(dict(field.optional(k, lambda f: f.pairs(Field.number)) or ()) for k in (divisor, least)),  # type: ignore[arg-type]
     )
     least_area = field.optional(area, Field.whole)
-    found = replace(found, least_contrast=field.maybe(contrast, Field.number))
+    found = replace(found, most_rough=field.maybe(rough, Field.number))
     return found if least_area is None else replace(found, least_area=least_area)
 
 

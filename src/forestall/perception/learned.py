@@ -73,7 +73,7 @@ class LearnedStateEstimator:
         ]
         asked = [(i, questions) for i, questions in asked if questions]
         least = self._encoder.reading.least_area
-        kind = asked and of_its_kind(frame.rgb, self._encoder.reading.least_contrast)
+        kind = asked and of_its_kind(frame.rgb, self._encoder.reading.most_rough)
         large = [(i, q) for i, q in asked if kind and np.count_nonzero(detections[i].mask) >= least]
         rows = self._encoder.encode_crops(frame.rgb, [detections[i].mask for i, _ in large])
         out: list[tuple[Mapping[str, str | None], Mapping[str, float]]] = [({}, {})] * len(

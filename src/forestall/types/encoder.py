@@ -17,15 +17,15 @@ class StateReading:
         temperature: attribute → by what its logits are divided; "" for every other attribute.
         threshold: attribute → confidence under which nothing is said; "" for every other one.
         least_area: mask pixels under which nothing is said.
-        least_contrast: how sharply pictures of its kind are parted into smooth areas and edges at
-            least (`perception/kind.py`); None: of every picture something is said.
+        most_rough: how rough pictures of its kind are at most, apart from noise
+            (`perception/kind.py`); None: of every picture something is said.
     """
 
     scale: float = 100.0
     temperature: Mapping[str, float] = field(default_factory=dict)
     threshold: Mapping[str, float] = field(default_factory=dict)
     least_area: int = 400
-    least_contrast: float | None = None
+    most_rough: float | None = None
 
     def __post_init__(self) -> None:
         if self.scale <= 0 or any(t <= 0 for t in self.temperature.values()):
