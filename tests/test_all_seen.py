@@ -56,3 +56,9 @@ def test_of_two_of_a_kind_the_rest_of_the_plan_means_the_one_that_was_taken(task
         b for b in record.boundaries if b.outcome is Outcome.REPLAN and b.index < len(skills) - 3
     ]
     assert not early, early[0].why
+
+
+def test_a_door_that_stayed_shut_unseen_is_tried_again() -> None:
+    """With two drives about it the scene had not changed over three subtasks: held."""
+    record = run("robofail-cook-egg-4", 3)
+    assert record.success, record.failures

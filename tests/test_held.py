@@ -147,6 +147,19 @@ def test_a_scene_that_never_changes_is_not_believed_after_three_subtasks() -> No
     assert monitor.before(scene("Mug-2")).may_start
 
 
+def test_driving_changes_no_scene_and_one_skill_may_fail_unseen() -> None:
+    monitor, _ = started()
+    drive = Subtask("navigate_to_obj", ("Mug",))
+    put, pick = PLAN.subtasks[1], PLAN.subtasks[0]
+    monitor.start(type(PLAN)((drive, drive, pick, drive, drive, put, drive)))
+    for _ in range(6):
+        assert monitor.before(scene()).may_start
+        monitor.after(DONE)
+    decision = monitor.before(scene())
+    assert decision.outcome is Outcome.LOOK
+    assert "nothing that is seen has changed over 6 subtasks" in decision.why
+
+
 def test_alarms_in_a_row_hold_where_each_would_be_let_pass() -> None:
     alarm = replace(GO, verdict=ALARM)
     limits = Limits(max_alarms_in_a_row=2)

@@ -15,13 +15,18 @@ from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 
 
+_WITHOUT_EFFECT = 2
+"""So many skills in a row that should have had an effect and show none are not to be believed."""
+
+
 @dataclass(slots=True)
 class Senses:
     """What was seen last, and what the robot says it has done since something changed.
 
     Args:
-        max_unchanged: subtasks that may be reported as done, one of them with an effect, while a
-            given scene graph stays the same; 0: any number.
+        max_unchanged: subtasks that may be reported as done while a given scene graph stays the
+            same; 0: any number. One of them that should have had an effect is what skills do
+            unseen; two are not believed.
     """
 
     max_unchanged: int
@@ -65,7 +70,9 @@ class Senses:
         seen = _timeless(graph)
         if seen != self._graph:
             self._graph, self._done, self._effects = seen, 0, 0
-        elif self._effects and 0 < self.max_unchanged <= self._done:
+        elif 0 < self.max_unchanged <= self._done and self._effects >= min(
+            _WITHOUT_EFFECT, self.max_unchanged
+        ):
             raise ObservationError(
                 f"nothing that is seen has changed over {self._done} subtasks reported as "
                 "done: the senses, or the reports, are not to be trusted"

@@ -59,7 +59,7 @@ class Limits:
             robot; 0: no limit.
         max_repairs_in_a_row: the same for new plans without a subtask that succeeds between them.
         max_failures_in_a_row: the same for subtasks that were refused or failed.
-        max_unchanged: subtasks that may be reported as done, one of them with an effect, while a
+        max_unchanged: subtasks that may be reported as done, two of them with an effect, while a
             given scene graph stays the same; 0: any number.
 
     Raises:

@@ -370,7 +370,7 @@ CASES: tuple[Case, ...] = (
         kind=SENSES,
         dead=True,
         blamed="senses",
-        limits={"max_unchanged": 2},  # before a judge stops for what it takes to be so
+        limits={"max_unchanged": 1},  # before a judge stops for what it takes to be so
     ),
     Case(
         "nothing is seen any more",
