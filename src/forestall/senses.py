@@ -14,7 +14,6 @@ from forestall.errors import ObservationError
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 
-
 _WITHOUT_EFFECT = 2
 """So many skills in a row that should have had an effect and show none are not to be believed."""
 

@@ -187,7 +187,23 @@ def test_sizes_of_things_tell_the_scale_without_a_floor() -> None:
     assert "sizes" in refused(depth(lambda z: z * 2.5)(seen))
     alone = observed(table[:2], looking((0.0, -0.3, 1.3), (0.0, 0.4, 0.75)))
     assert refused(alone) == set()
-    assert "sizes" in refused(depth(lambda z: z * 4)(alone))
+    assert "sizes" in refused(depth(lambda z: z * 10)(alone))
+    assert refused(depth(lambda z: z / 10)(alone))
+
+
+@pytest.mark.parametrize(("called", "size_m"), [("Egg", (0.2, 0.2, 0.13)), ("Pot", (0.05,) * 3)])
+def test_one_thing_under_a_wrong_name_is_doubted_and_not_refused(
+    called: str, size_m: tuple[float, float, float]
+) -> None:
+    """A pot that a detector calls an egg and the other way round, with nothing else to judge by."""
+    table = Solid("DiningTable-1", (-0.8, 0.0, 0.7), (0.8, 0.8, 0.74))
+    seen = observed(
+        [table, at(f"{called}-1", 0.0, 0.3, 0.74, size_m)],
+        looking((0.0, -0.3, 1.3), (0.0, 0.4, 0.75)),
+    )
+    assert "sizes" not in refused(seen)
+    found = [f for f in inspect(seen, HOUSEHOLD, GateConfig()) if f.what == "sizes"]
+    assert [f.refuses for f in found] == [False] and "miscalled" in found[0].sentence
 
 
 TABLE_M = 0.74
@@ -254,7 +270,7 @@ def test_what_something_stands_before_is_not_too_small() -> None:
         at("Bottle-1", 0.0, 0.35, TABLE_M, (0.2, 0.02, 0.3)),
     ]
     low = looking((0.0, -0.5, 0.9), (0.0, 0.4, 0.85))
-    domain = with_size("Plate", (0.9, 0.9, 0.3))
+    domain = with_size("Plate", (3.0, 3.0, 1.0))
     assert "sizes" not in refused_by(domain, observed(behind, low), 1.0)
     assert "sizes" in refused_by(domain, observed(behind[:2], low), 1.0), "its size is wrong"
 

@@ -63,6 +63,8 @@ class GateConfig:
         too_small: the same downwards for a picture with one whole thing (real: 0.58).
         all_too_small: the largest of two or more whole things (kitchens: 0.8; real: 0.58, one
             alone).
+        lone_refused: how many times too large or small one thing alone is where no wrong name
+            explains it (a lettuce called a slice of potato: 3.8).
         covered: share of an outline behind something nearer from which a thing is not whole.
         covered_step: how much nearer, as a share of the distance.
         furniture_small: largest of two or more whole things, where the height of furniture says
@@ -111,6 +113,7 @@ class GateConfig:
     all_too_large: float = 1.6
     too_small: float = 0.3
     all_too_small: float = 0.5
+    lone_refused: float = 8.0
     covered: float = 0.1
     covered_step: float = 0.03
     furniture_small: float = 0.75

@@ -42,6 +42,8 @@ def judge_sizes(
 ) -> Iterator[Finding]:
     """Everything is larger, or everything whole is smaller, than it can be.
 
+    Of one thing alone it is said, and refused only where no wrong name explains it.
+
     Args:
         look: the picture.
         index: of the picture.
@@ -53,18 +55,23 @@ def judge_sizes(
     whole = [s for s in found if s.whole]
     small = limits.too_small if len(whole) == 1 else limits.all_too_small
     if whole and max(s.ratio for s in whole) < small:
-        yield Finding("sizes", _told(whole, "smaller"), index)
+        yield _finding(whole, "smaller", index, limits)
         return
     for least, count in ((limits.all_too_large, 2), (limits.too_large, 1)):
         told = [s for s in found if s.whole or s.ratio > least]
         if len(told) >= count and min(s.ratio for s in told) > least:
-            yield Finding("sizes", _told(told, "larger"), index)
+            yield _finding(told, "larger", index, limits)
             return
     yield from _furniture(look, index, stands_m, whole, domain, limits)
 
 
-def _told(found: Sequence[Sized], than: str) -> str:
-    return f"everything whose size is known is {than} than it can be ({_listed(found)}): {_WRONG}"
+def _finding(found: Sequence[Sized], than: str, index: int, limits: GateConfig) -> Finding:
+    """One thing alone may be another than it is called: by that much no thing is another."""
+    told = f"everything whose size is known is {than} than it can be ({_listed(found)})"
+    off = max(max(s.ratio, 1 / s.ratio) for s in found)
+    if len(found) == 1 and off < limits.lone_refused:
+        return Finding("sizes", f"{told}: it is miscalled, or {_WRONG}", index, refuses=False)
+    return Finding("sizes", f"{told}: {_WRONG}", index)
 
 
 def _listed(found: Sequence[Sized]) -> str:
