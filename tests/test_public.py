@@ -52,6 +52,8 @@ TWENTY: list[tuple[str, dict[str, Any], str, Outcome, str]] = [
     ("unknown relation", scene("hand", relations=["tray-1 covers hole-1"]), INSERT, NOT, "covers"),
     ("never shown", scene("hand"), "weld(peg-1)", NOT, "unknown skill 'weld'"),
     ("no such thing", scene("hand"), "grasp(cup)", NOT, "not located: cup"),
+    ("of another kind", scene(), "grasp(lid-1)", NOT, "lid-1 is no peg, and no demonstration"),
+    ("of no kind", scene(more=["cup-1"]), "grasp(cup-1)", NOT, "has a cup there"),
 ]
 
 

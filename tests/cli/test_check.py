@@ -440,3 +440,26 @@ def test_what_only_a_task_asks_is_judged_by_the_only_one_there_is_and_else_named
     fine = written(tmp_path / "fine", PLATE, MUG)
     code, told = checked(capsys, [fine], *asked)
     assert (code, told["scenes"][0]["why"]) == (0, "")
+
+
+def test_the_scenes_of_a_demonstration_fit_it_whatever_stands_on_what(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Later needs are held against the whole scene: what they are mined from must show the same."""
+    memory = tmp_path / "pegs.db"
+    free, held, seated = (
+        pegs(peg, more=["bench-1"], relations=["hole-1 stands_on bench-1"])
+        for peg in ("tray", "hand", "hole")
+    )
+    run = [("grasp(peg-1)", free), (INSERT, held), seated]
+    with open_store(memory, create=True) as store:
+        for d in demonstrations_from([run] * 4):
+            store.add(d)
+    for number, scene in enumerate((free, held), 1):
+        (tmp_path / f"{number}.json").write_text(json.dumps(scene))
+    scenes = [tmp_path / "1.json", tmp_path / "2.json"]
+    plan = ["--plan", f"grasp(peg-1); {INSERT}", "--memory", str(memory)]
+    code, told = checked(capsys, scenes, *plan)
+    assert (code, [s["outcome"] for s in told["scenes"]]) == (0, ["proceed", "proceed"])
+    assert call(["check", str(scenes[0]), *plan, "--explain", str(tmp_path / "x.png")]) == 2
+    assert "a scene graph has no picture" in capsys.readouterr().err

@@ -13,7 +13,7 @@ import numpy as np
 from forestall.assembly.stored import is_graph, scenes_in
 from forestall.domain.model import Domain
 from forestall.domain.words import Names
-from forestall.errors import FileFormatError, ForestallError
+from forestall.errors import FileFormatError, ForestallError, InputError
 from forestall.perception.explain import explain
 from forestall.perception.folder import read_observation
 from forestall.perception.gate import inspect
@@ -27,7 +27,7 @@ def explain_stored(paths: Sequence[Path], file: Path, domain: Domain) -> list[Pa
     """Draw scenes, each into a picture of its own.
 
     Args:
-        paths: as for `judge_stored`; scene graphs have no pictures and are left out.
+        paths: as for `judge_stored`; scene graphs among them have no pictures and are left out.
         file: the picture; with several scenes "-1", "-2" ... before its suffix.
         domain: how the observations are read.
 
@@ -35,9 +35,11 @@ def explain_stored(paths: Sequence[Path], file: Path, domain: Domain) -> list[Pa
         What was written.
 
     Raises:
-        InputError: an observation cannot be read, or the picture cannot be written.
+        InputError: an observation cannot be read, or the picture cannot be written; there is none.
     """
     folders = [scene for scene in scenes_in(paths) if not is_graph(scene)]
+    if not folders:
+        raise InputError("nothing to draw: a scene graph has no picture; leave --explain out")
     names, written = Names(domain), []
     for number, folder in enumerate(folders, 1):
         observation, states = read_observation(folder, domain, gate=None, names=names)

@@ -101,7 +101,8 @@ def calibrate(
             written = f"{out} and {picture}"
         else:
             say(f"no picture of it: {how('figures')}")
-        say(f"{written} written: give it to runs with --detector.calibration {out}")
+        same = "give it to runs with the same judge as --detector, and"
+        say(f"{written} written: {same} --detector.calibration {out}")
     return 0
 
 

@@ -25,7 +25,7 @@ from forestall.domain.asked import not_understood
 from forestall.domain.model import Domain
 from forestall.errors import InputError
 from forestall.seams.judging import Expectations
-from forestall.types.facts import Literal, Truth
+from forestall.types.facts import Literal, Truth, category_of
 from forestall.types.graph import SceneGraph
 from forestall.types.observation import Observation
 from forestall.types.plan import Subtask
@@ -201,6 +201,7 @@ class PreconditionDetector:
             return replace(verdict, expected_by=max(false, key=weight).precondition.expected_by)
         unseen = [v for v in found if v.truth is Truth.UNOBSERVED]
         strange = not_understood(observed, subtask, self._domain)
+        strange += self._never_shown(subtask, references)
         if unseen or strange:
             seen_not = [_listed("not observed", unseen)] if unseen else []
             note = "; ".join([*strange, *seen_not])
@@ -212,6 +213,30 @@ class PreconditionDetector:
         by = " and ".join(models)
         note = f"no demonstration of it; it is as the language model {by} expects"
         return replace(self._verdict(Decision.PROCEED, score, references, note), expected_by=by)
+
+    def _never_shown(self, subtask: Subtask, references: Sequence[Reference]) -> list[str]:
+        """Arguments of a kind that the skill does not take, as far as anybody knows or has shown.
+
+        Needs of the other arguments would else let it start.
+        """
+        skill = self._domain.skills.get(subtask.skill)
+        if skill is None:
+            return []
+        shown = {
+            (place, category_of(name))
+            for r in references
+            if r.subtask.skill == subtask.skill
+            for place, name in enumerate(r.subtask.args)
+        }
+        found = []
+        for place, (name, taken) in enumerate(zip(subtask.args, skill.parameters, strict=True)):
+            category = category_of(name)
+            known = self._domain.find(category)
+            fits = known is not None and self._domain.is_a(known.name, taken.kind)
+            if taken.kind is not None and not fits and (place, category) not in shown:
+                of = f"no demonstration of {subtask.skill} has a {category} there"
+                found.append(f"{name} is no {taken.kind}, and {of}")
+        return found
 
     def _not_judged(
         self,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Set
+from functools import lru_cache
 
 from forestall.domain.counted import counted
+from forestall.domain.formula import literals
 from forestall.domain.model import Domain
 from forestall.perception.config import ScopeConfig
 from forestall.perception.relations import DIRECTIONS
@@ -42,6 +44,9 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
         if r.predicate == domain.roles.blocking and r.object in arguments
     }
     kept |= _devices(graph, arguments | _direct(graph, arguments, domain), domain)
+    defining = _defining(domain)
+    ends = [{r.subject, r.object} for r in graph.relations if r.predicate in defining]
+    kept |= {name for pair in ends if pair & arguments for name in pair}
     known = {*domain.relations, *DIRECTIONS}
     strange = [r for r in graph.relations if r.predicate not in known]
     pairs = [{r.subject, r.object} for r in strange]
@@ -55,6 +60,17 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
         if r.predicate in telling and r.subject in ids and r.object in ids
     )
     return SceneGraph(nodes, relations, subtask, tuple(h for h in graph.hidden if h in ids))
+
+
+@lru_cache(maxsize=32)
+def _defining(domain: Domain) -> frozenset[str]:
+    """Relations by which something derived is defined, but those that say where a thing is.
+
+    That nothing has such a relation to a thing cannot be read where what has it is left out.
+    """
+    formulas = (p.definition for p in domain.derived.values() if p.definition is not None)
+    used = {literal.predicate for f in formulas for literal, _ in literals(f)}
+    return frozenset(used.intersection(domain.relations).difference(domain.containing))
 
 
 def _direct(graph: SceneGraph, names: Iterable[str], domain: Domain) -> set[str]:
