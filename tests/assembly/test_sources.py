@@ -111,9 +111,11 @@ def test_files_that_show_none(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
         with pytest.raises(FileFormatError, match=said):
             demonstrations_from(tmp_path / name)
-    with pytest.raises(InputError, match="no demonstration was found"):
-        (tmp_path / "empty").mkdir()
-        demonstrations_from(tmp_path / "empty")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    for source in (empty, (empty,)):
+        with pytest.raises(InputError, match=f"no demonstration was found in {empty}$"):
+            demonstrations_from(source)
 
 
 def test_graphs_are_taken_as_they_are() -> None:

@@ -153,6 +153,8 @@ def test_a_sequence_is_judged_before_the_subtasks_of_a_plan(
     text = page.read_text(encoding="utf-8")
     assert told["page"] == str(page) and "data:image/" in text
     assert "alarm, replanned" in text and "put_on" in text and "stored observations" in text
+    assert "a corrected plan is proposed; 3 stored scenes judged, and nothing was" in text
+    assert "took the place" not in text and "breaks off" not in text
     scenes = [str(tmp_path / "run" / name) for name in ("step-3", "step-02")]
     assert call(["check", *scenes, *asked]) == 1
     out = capsys.readouterr().out

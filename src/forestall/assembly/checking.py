@@ -34,6 +34,7 @@ from forestall.seams.judging import Strategy
 from forestall.types.decision import Hold, MonitorDecision, Outcome
 from forestall.types.demonstration import Demonstration
 from forestall.types.episode import (
+    STORED,
     BoundaryRecord,
     EpisodeEnd,
     EpisodeRecord,
@@ -51,9 +52,6 @@ from forestall.types.task import Goal, Task
 
 TRUTH_STATES = "oracle"
 """The simulator's own, which no stored observation has."""
-
-STORED = "stored observations"
-"""What stands in the record in the place of a scenario."""
 
 ATTEMPTS = "max_attempts"
 """Option of a strategy that gives up after so many repairs of one cause; here none is tried."""

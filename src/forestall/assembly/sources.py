@@ -385,5 +385,7 @@ def _same(one: Demonstration, other: Demonstration) -> bool:
 
 
 def _said(source: Source) -> str:
+    if isinstance(source, list | tuple) and all(isinstance(s, str | Path) for s in source):
+        return ", ".join(map(str, source)) or "an empty list"
     text = str(source) if isinstance(source, str | Path) else type(source).__name__
     return repr(text) if isinstance(source, str) else text

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from forestall.records.beside import ALONE
 from forestall.records.derived import Alarm, alarms, done_before, in_words
 from forestall.report.words import duration
-from forestall.types.episode import EpisodeEnd, EpisodeRecord, SkillStatus
+from forestall.types.episode import STORED, EpisodeEnd, EpisodeRecord, SkillStatus
 from forestall.types.runtime import When
 
 _ENDS = re.compile(r"(?<=[.!?])\s+(?=[A-Z\d])")
@@ -53,7 +53,9 @@ def _seen(record: EpisodeRecord, found: Sequence[Alarm]) -> str:
     moment = in_words(alarm.when)
     step = len(done_before(record, boundary)) + (alarm.when is When.BEFORE)
     place = f"{moment[0].upper()}{moment[1:]} step {step}, {alarm.subtask}"
-    if alarm.replanned:
+    if alarm.replanned and record.scenario == STORED:
+        came = "a corrected plan is proposed"
+    elif alarm.replanned:
         came = "a new plan took the place of the old one"
     elif alarm.outcome is not None:
         came = f"the plan stayed ({alarm.outcome.value})"
@@ -80,6 +82,9 @@ def _unseen(record: EpisodeRecord) -> str:
 
 def _end(record: EpisodeRecord) -> str:
     count = len(record.executed)
+    if record.scenario == STORED:
+        scenes = len(record.boundaries)
+        return f"{scenes} stored scene{'s' * (scenes != 1)} judged, and nothing was carried out"
     if record.end is EpisodeEnd.UNFINISHED:
         return f"the record breaks off after {count} subtask{'s' * (count != 1)}"
     if record.trouble is not None:

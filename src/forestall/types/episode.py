@@ -109,6 +109,10 @@ class ExecutedRecord:
     index: int
 
 
+STORED = "stored observations"
+"""What stands in the place of a scenario where scenes were judged and nothing was carried out."""
+
+
 class EpisodeEnd(Enum):
     """Why an episode ended."""
 
