@@ -1,11 +1,14 @@
 """What is published follows from the rows that lie beside it."""
 
 import json
+import lzma
+import shutil
 from pathlib import Path
 
 import pytest
 
 from experiments.published import DOCUMENTS, SHOWN, filled
+from forestall.experiments import robustness
 from forestall.experiments.results import present
 from forestall.experiments.stored import PACKED
 
@@ -28,6 +31,16 @@ def test_the_tables_are_those_of_the_rows(folder: Path, tmp_path: Path) -> None:
     kept = {p.name: p.read_text(encoding="utf-8") for p in (folder / "tables").iterdir()}
     assert kept
     assert {name: made[name] for name in kept} == kept
+
+
+@pytest.mark.parametrize("judge", ["plan-check", "preconditions", "scene-graph"])
+def test_robustness_is_that_of_its_rows(judge: str, tmp_path: Path) -> None:
+    kept = ROOT / "results" / "robustness"
+    rows = lzma.decompress((kept / f"rows.jsonl{PACKED}").read_bytes())
+    (tmp_path / "episodes.jsonl").write_bytes(rows)
+    shutil.copy(kept / "experiment.json", tmp_path)
+    made = robustness.present(tmp_path, judge)
+    assert made.csv() == (kept / f"{judge}.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("folder", PUBLISHED, ids=lambda f: f.name)

@@ -106,7 +106,7 @@ def check(
         domain: what everything is read in: a name, or a file (.toml, .pddl); by default the task's,
             else one that has the skills of the memory, else one that is learnt from it.
         detector: what judges: preconditions (by default), scene-graph, objects, caption, image.
-        threshold: alarm when no demonstration reaches this score.
+        threshold: alarm below this score of what judges.
         states: given (as the folder says), or read off its pictures: learned, clip.
         config: a TOML file with a table for each kind of part; flags come over it.
         settings: one option of a part; --detector.threshold 0.85 is short for

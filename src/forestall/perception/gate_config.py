@@ -64,7 +64,7 @@ class GateConfig:
         all_too_small: the largest of two or more whole things (kitchens: 0.8; real: 0.58, one
             alone).
         lone_refused: how many times too large or small one thing alone is where no wrong name
-            explains it (a lettuce called a slice of potato: 3.8).
+            explains it (a detector's mistakes in the tests of sensors: up to 3.8).
         covered: share of an outline behind something nearer from which a thing is not whole.
         covered_step: how much nearer, as a share of the distance.
         furniture_small: largest of two or more whole things, where the height of furniture says

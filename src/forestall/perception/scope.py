@@ -20,7 +20,8 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
 
     A category name as argument stands for every node of that category. What holds many things by
     nature loses its contents, unless the skill itself asks for them. What is said of an argument in
-    a relation that the domain does not know is kept: it may matter.
+    a relation that the domain does not know is kept: it may matter. So is what is said in one by
+    which something derived is defined.
     """
     if config.whole:
         return SceneGraph(graph.nodes, graph.relations, subtask, graph.hidden)
@@ -44,16 +45,14 @@ def scope(graph: SceneGraph, subtask: Subtask, domain: Domain, config: ScopeConf
         if r.predicate == domain.roles.blocking and r.object in arguments
     }
     kept |= _devices(graph, arguments | _direct(graph, arguments, domain), domain)
-    defining = _defining(domain)
-    ends = [{r.subject, r.object} for r in graph.relations if r.predicate in defining]
-    kept |= {name for pair in ends if pair & arguments for name in pair}
     known = {*domain.relations, *DIRECTIONS}
-    strange = [r for r in graph.relations if r.predicate not in known]
-    pairs = [{r.subject, r.object} for r in strange]
+    strange = {r.predicate for r in graph.relations} - known
+    with_both_ends = strange | _defining(domain)
+    pairs = [{r.subject, r.object} for r in graph.relations if r.predicate in with_both_ends]
     kept |= {name for pair in pairs if pair & arguments for name in pair}
     nodes = tuple(n for n in graph.nodes if n.id in kept)
     ids = {n.id for n in nodes}
-    telling = {*domain.scored, *(r.predicate for r in strange)}
+    telling = {*domain.scored, *strange}
     relations = tuple(
         r
         for r in graph.relations

@@ -37,6 +37,7 @@ def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[Change
         if node.id in before.kinds and node.id not in after.kinds
     )
     seen = {node.id for node in graph.nodes}
+    attributes = sorted(domain.attributes)
     placed = tuple(
         Change(thing, predicate, "", receptacle)
         for predicate, thing, receptacle in sorted(
@@ -50,7 +51,7 @@ def altered(graph: SceneGraph, subtask: Subtask, domain: Domain) -> tuple[Change
         + tuple(
             Change(node.id, attribute, old, new)
             for node in graph.nodes
-            for attribute in sorted(domain.attributes)
+            for attribute in attributes
             if (old := before.value(node.id, attribute)) is not None
             and (new := after.value(node.id, attribute)) is not None
             and old != new
